@@ -1,0 +1,74 @@
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help setup run test lint colcon test-jazzy-versions clean
+
+PYTHON = python3
+VARIANT = symmetric_ode
+DURATION = 10
+RATE = 200
+OUT = run
+PYTEST_ARGS =
+
+# The interpreter beneath any virtual environment, and where rclpy comes from:
+# `ros`, a sourced ROS 2 in which it imports, or `pypi`, the wheels.
+BASE := $(shell $(PYTHON) -c 'import sys; print(sys._base_executable)')
+ROS := $(shell $(BASE) -c 'import rclpy' 2>/dev/null && echo ros || echo pypi)
+
+PACKAGING := Makefile package.xml setup.cfg setup.py
+# pip writes console scripts to bin/ whatever setup.cfg says, if it builds by PEP 517.
+PIP_INSTALL := bin/pip install --quiet --use-pep517
+
+# What .venv-lint, .venv-colcon and .venv-jazzy hold.
+lint := ruff==0.17.6
+colcon := colcon-common-extensions ros-jazzy-ament-package 'setuptools<80' wheel
+jazzy := --editable '.[test]' numpy==1.26.4 scipy==1.11.4
+
+help:  ## print this
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 22
+
+setup: .venv/$(ROS)  ## make .venv, with a sourced ROS 2 or else with its wheels from PyPI
+
+# The last command makes the stamp: a .venv without it is made anew.
+.venv/pypi: $(PACKAGING)
+	rm -rf .venv
+	$(BASE) -m venv .venv
+	.venv/$(PIP_INSTALL) --editable '.[ros,test]'
+	touch $@
+
+# Needs no network when rosdep has installed the dependencies; numpy stays the one of ROS.
+.venv/ros: $(PACKAGING)
+	rm -rf .venv
+	$(BASE) -m venv --system-site-packages .venv
+	.venv/$(PIP_INSTALL) setuptools wheel
+	.venv/$(PIP_INSTALL) --no-build-isolation --editable '.[test]' \
+	  "numpy==$$(.venv/bin/python -c 'import numpy; print(numpy.__version__)')"
+	touch $@
+
+.venv-%/done: $(PACKAGING)
+	rm -rf $(@D)
+	$(BASE) -m venv $(@D)
+	env -u PYTHONPATH $(@D)/$(PIP_INSTALL) $($*)
+	touch $@
+
+run: setup  ## run the demo: VARIANT, DURATION in s, RATE in Hz, OUT a folder
+	.venv/bin/demo --variant $(VARIANT) --duration $(DURATION) --rate $(RATE) --out $(OUT)
+
+test: setup  ## run the tests: PYTEST_ARGS
+	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \
+	  .venv/bin/python -m pytest $(PYTEST_ARGS)
+
+lint: .venv-lint/done  ## check the style
+	.venv-lint/bin/ruff check
+
+colcon: .venv-colcon/done  ## build the package with colcon and check what it installs
+	rm -rf build install log
+	env -u PYTHONPATH PATH="$(CURDIR)/.venv-colcon/bin:$$PATH" colcon build
+	test -x install/dm_ros/lib/dm_ros/differential
+	test -f install/dm_ros/share/dm_ros/package.xml
+	ls install/dm_ros/share/dm_ros/config/*.yaml
+
+test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's numpy and scipy
+	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest --ignore=test/ros $(PYTEST_ARGS)
+
+clean:  ## remove all that the other targets make
+	rm -rf .venv .venv-* build install log run *.egg-info .hypothesis .pytest_cache .ruff_cache
