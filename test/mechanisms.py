@@ -1,0 +1,177 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the tests of the physics share: random mechanisms and references from first principles."""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from dm_ros import SelfLockingParameters, SymmetricParameters
+
+BOTH = (1, -1)   # directions of power flow
+
+
+class UncheckedParameters(SelfLockingParameters):
+    """Self-locking parameters that may lock the mechanism."""
+
+    def _check_mechanism(self):
+        pass
+
+
+def lossless(p):
+    """Return the parameters with all efficiencies 1."""
+    return dataclasses.replace(
+        p, **{f.name: 1.0 for f in dataclasses.fields(p) if f.name.startswith('eta_')})
+
+
+def _spread(rng, p, starts):
+    """Return values up to five times the defaults or down to a fifth of them."""
+    return {f.name: getattr(p, f.name) * 5.0 ** rng.uniform(-1, 1)
+            for f in dataclasses.fields(p) if f.name.startswith(starts)}
+
+
+def _efficiencies(rng, p):
+    return {f.name: rng.uniform(0.85, 1.0)
+            for f in dataclasses.fields(p) if f.name.startswith('eta_')}
+
+
+def random_symmetric(rng):
+    """Return random admissible parameters of the symmetric differential, g_F of either sign."""
+    p = SymmetricParameters()
+    return SymmetricParameters(
+        **_spread(rng, p, ('I_', 'l_')), **_efficiencies(rng, p), n_s=int(rng.integers(1, 5)),
+        g_F=float(rng.choice([-1, 1])) * rng.uniform(1.5, 6), g_2s=rng.uniform(0.3, 1.2))
+
+
+def random_self_locking(rng, share=None, kind=SelfLockingParameters):
+    """
+    Return random parameters of the self-locking differential.
+
+    :param share: of the limit tan(alpha) f_k < eta_kG eta_0B at which both clutches stand;
+        None for random shares below 0.95.
+    """
+    p = SelfLockingParameters()
+    values = {**_spread(rng, p, ('I_', 'l_', 'R_', 'N_')), **_efficiencies(rng, p),
+              'n_s': int(rng.integers(1, 6)), 'g_2s': rng.uniform(0.2, 1.0),
+              'alpha': rng.uniform(0.15, 0.6),
+              'n_F1': int(rng.integers(1, 6)), 'n_F2': int(rng.integers(1, 10)),
+              'c_f1': rng.uniform(1, 8), 'c_f2': rng.uniform(1, 8)}
+    for k in '12':
+        gain = rng.uniform(0, 0.95) if share is None else share
+        limit = values[f'eta_{k}G'] * values['eta_0B']
+        values[f'R_F{k}'] = values[f'R_{k}'] * rng.uniform(0.7, 1.4)
+        values[f'mu_{k}'] = (gain * limit * values[f'R_{k}'] / values[f'R_F{k}']
+                             / values[f'n_F{k}'] / math.tan(values['alpha']))
+    return kind(**values)
+
+
+def mirrored_symmetric(p):
+    """Return the symmetric differential with left and right exchanged."""
+    return dataclasses.replace(
+        p, I_1=p.I_2, I_2=p.I_1, l_1=p.l_2, l_2=p.l_1, eta_1G=p.eta_2G, eta_2G=p.eta_1G)
+
+
+def mirrored_self_locking(p):
+    """Return the self-locking differential with front and rear exchanged."""
+    pairs = [('R_1', 'R_2'), ('I_1', 'I_2'), ('l_1', 'l_2'), ('eta_1G', 'eta_2G'),
+             ('n_F1', 'n_F2'), ('mu_1', 'mu_2'), ('c_f1', 'c_f2'), ('R_F1', 'R_F2'),
+             ('N_1', 'N_2')]
+    exchanged = {a: getattr(p, b) for a, b in pairs} | {b: getattr(p, a) for a, b in pairs}
+    # g_2s is the satellite radius over the rear crown radius, and the rear is now the front
+    return dataclasses.replace(p, **exchanged, g_2s=p.g_2s * p.R_2 / p.R_1)
+
+
+def symmetric_speeds(p, w_1, w_2):
+    """Return (omega_0, omega_1, omega_2, omega_3, omega_s), (5)-(7)."""
+    w_0 = (w_1 + w_2) / 2
+    return np.array([w_0, w_1, w_2, p.g_F * w_0, (w_2 - w_1) / (2 * p.g_2s)])
+
+
+def self_locking_speeds(p, w_1, w_2):
+    """Return (omega_0, omega_1, omega_2, omega_s), (53)."""
+    g = p.R_2 / p.R_1
+    return np.array([(w_1 + g * w_2) / (1 + g), w_1, w_2, (w_2 - w_1) / (p.g_2s * (1 + g))])
+
+
+def _weighted_squares(weights, speeds):
+    return 0.5 * sum(c * w**2 for c, w in zip(weights, speeds, strict=True))
+
+
+def symmetric_energy(p, w_1, w_2):
+    """Return the kinetic energy of carrier, side gears, pinion and spinning satellites, J."""
+    return _weighted_squares([p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s],
+                             symmetric_speeds(p, w_1, w_2))
+
+
+def symmetric_dissipation(p, w_1, w_2):
+    """Return Rayleigh's function of the viscous drag, half the lost power, W."""
+    w_0, w_1, w_2, w_3, w_s = symmetric_speeds(p, w_1, w_2)
+    return _weighted_squares([p.l_0, p.l_1, p.l_2, p.l_3, p.n_s * p.l_s],
+                             [w_0, w_1 - w_0, w_2 - w_0, w_3, w_s])
+
+
+def self_locking_energy(p, w_1, w_2):
+    """Return the kinetic energy of carrier, crown gears and spinning satellites, J."""
+    return _weighted_squares([p.I_0, p.I_1, p.I_2, p.n_s * p.I_s],
+                             self_locking_speeds(p, w_1, w_2))
+
+
+def self_locking_dissipation(p, w_1, w_2):
+    """Return Rayleigh's function of the viscous drag, half the lost power, W."""
+    w_0, w_1, w_2, w_s = self_locking_speeds(p, w_1, w_2)
+    return _weighted_squares([p.l_0, p.l_1, p.l_2, p.n_s * p.l_s],
+                             [w_0, w_1 - w_0, w_2 - w_0, w_s])
+
+
+def _form(quadratic, p):
+    """Return the matrix of a quadratic form, 1/2 w' H w = quadratic(p, *w), by polarization."""
+    a, b, both = (quadratic(p, *w) for w in ((1, 0), (0, 1), (1, 1)))
+    return np.array([[2 * a, both - a - b], [both - a - b, 2 * b]])
+
+
+def lagrange(p, energy, dissipation, power, w):
+    """
+    Return (e_1, e_2) of a lossless differential from Lagrange's equations.
+
+    d/dt dT/dw = Q - dD/dw with the kinetic energy T, Rayleigh's function D and the generalized
+    torques Q, which do the virtual work ``power(w_1, w_2)``, linear in the speeds.
+    """
+    Q = np.array([power(1.0, 0.0), power(0.0, 1.0)])
+    return np.linalg.solve(_form(energy, p), Q - _form(dissipation, p) @ w)
+
+
+def symmetric_lagrange(p, w, T):
+    """Return (e_1, e_2) of the lossless symmetric differential under T = (T_1, T_2, T_3)."""
+    def power(w_1, w_2):
+        _, w_1, w_2, w_3, _ = symmetric_speeds(p, w_1, w_2)
+        return T[0] * w_1 + T[1] * w_2 + T[2] * w_3
+    return lagrange(p, symmetric_energy, symmetric_dissipation, power, w)
+
+
+def self_locking_lagrange(p, w, T, F):
+    """Return (e_1, e_2) of the lossless self-locking one under T = (T_0, T_1, T_2) and F."""
+    def power(w_1, w_2):
+        w_0, w_1, w_2, _ = self_locking_speeds(p, w_1, w_2)
+        return (T[0] * w_0 + T[1] * w_1 + T[2] * w_2
+                - F[0] * (w_1 - w_0) - F[1] * (w_2 - w_0))
+    return lagrange(p, self_locking_energy, self_locking_dissipation, power, w)
+
+
+def relative_difference(a, b):
+    """Return the largest difference of two arrays over the largest entry."""
+    a, b = np.asarray(a), np.asarray(b)
+    return np.abs(a - b).max() / max(np.abs(a).max(), np.abs(b).max())

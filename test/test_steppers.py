@@ -1,0 +1,386 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The fixed-step integrators are right beside exact and adaptive solutions."""
+
+from mechanisms import BOTH, random_self_locking, random_symmetric, relative_difference
+import numpy as np
+import pytest
+from scipy.integrate import odeint, solve_ivp
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from dm_ros import self_locking, SelfLockingParameters, Simulation, steppers
+from dm_ros.self_locking import SelfLockingOde
+from dm_ros.steppers import (
+    apply_phi_2,
+    backward_euler,
+    ClutchStep,
+    held_torque_propagator,
+    HeldTorqueStep,
+    phi_2,
+    rosenbrock_part,
+)
+from dm_ros.symmetric import SymmetricOde
+
+
+def clutch_step(p=None):
+    p = p or SelfLockingParameters()
+    return ClutchStep({d: SelfLockingOde(p).response(d) for d in BOTH},
+                      self_locking.slip_steepness(p), self_locking.full_friction(p))
+
+
+# The exact step
+
+
+@pytest.mark.parametrize('h', [1e-4, 5e-3, 0.1, 1.0])
+@pytest.mark.parametrize('direction', BOTH)
+def test_held_torque_step_is_the_solution_of_an_adaptive_solver(direction, h):
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        response = SymmetricOde(random_symmetric(rng)).response(direction)
+        x, u = rng.normal(0, 50, 2), rng.normal(0, 20, 3)
+        stepper = HeldTorqueStep({direction: response}, h)
+        solution = solve_ivp(
+            lambda t, z, A=response.A, b=response.B @ u: np.concatenate([A @ z[:2] + b, z[:2]]),
+            (0, h), [*x, 0, 0], 'DOP853', rtol=1e-13, atol=1e-13).y[:, -1]
+        speeds, integral = stepper.step(x, u, direction)
+        assert relative_difference(speeds, solution[:2]) < 1e-11
+        assert relative_difference(integral, solution[2:]) < 1e-11
+
+
+@pytest.mark.parametrize('h', [1e-3, 0.1])
+def test_two_half_steps_are_one_exact_step(h):
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        r = SymmetricOde(random_symmetric(rng)).response(1)
+        Phi, Gamma, Psi, Theta = held_torque_propagator(r.A, r.B, h)
+        half_Phi, half_Gamma, half_Psi, half_Theta = held_torque_propagator(r.A, r.B, h / 2)
+        assert relative_difference(half_Phi @ half_Phi, Phi) < 1e-13
+        assert relative_difference(half_Phi @ half_Gamma + half_Gamma, Gamma) < 1e-13
+        assert relative_difference(half_Psi + half_Psi @ half_Phi, Psi) < 1e-13
+        assert relative_difference(2 * half_Theta + half_Psi @ half_Gamma, Theta) < 1e-13
+
+
+# phi_2
+
+
+def phi_2_by_expm(Z):
+    """Return phi_2(Z) out of the exponential of (Z I 0; 0 0 I; 0 0 0)."""
+    n = len(Z)
+    big = np.zeros((3 * n, 3 * n))
+    big[:n, :n], big[:n, n:2 * n], big[n:2 * n, 2 * n:] = Z, np.eye(n), np.eye(n)
+    return expm(big)[:n, 2 * n:]
+
+
+def with_eigenvalues(rng, high, low):
+    V = np.array([[1, rng.uniform(-0.8, 0.8)], [rng.uniform(-0.8, 0.8), 1]])
+    return V @ np.diag([high, low]) @ np.linalg.inv(V)
+
+
+def rotation(rng, real, imaginary):
+    V = np.array([[1, rng.uniform(-0.8, 0.8)], [rng.uniform(-0.8, 0.8), 1]])
+    return V @ np.array([[real, imaginary], [-imaginary, real]]) @ np.linalg.inv(V)
+
+
+MATRICES = {
+    'small': lambda rng: rng.normal(0, 1e-3, (2, 2)),
+    'medium': lambda rng: rng.normal(0, 3, (2, 2)),
+    'stiff at 1 kHz': lambda rng: with_eigenvalues(rng, -0.1e-3, -50.0),
+    'stiff at 1 Hz': lambda rng: with_eigenvalues(rng, -0.1, -5e4),
+    'nearly equal': lambda rng: with_eigenvalues(rng, z := rng.uniform(-9, 0), z + 1e-9),
+    'close': lambda rng: with_eigenvalues(rng, z := rng.uniform(-9, 0), z + 1.9e-4),
+    'at the switch of the series': lambda rng: with_eigenvalues(rng, -0.0199, -0.0201),
+    'equal': lambda rng: rng.uniform(-9, 0) * np.eye(2),
+    'defective': lambda rng: np.array([[z := rng.uniform(-9, 0), rng.normal()], [0, z]]),
+    'complex': lambda rng: rotation(rng, rng.uniform(-5, 0), rng.uniform(0.1, 5)),
+    'nearly real': lambda rng: rotation(rng, rng.uniform(-5, 0), 1e-6),
+    'zero': lambda rng: np.zeros((2, 2)),
+}
+MEETING = ('nearly equal', 'defective', 'nearly real')
+
+
+@pytest.mark.parametrize('kind', MATRICES)
+def test_phi_2_of_a_matrix_is_that_of_the_matrix_exponential(kind):
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        Z, v = MATRICES[kind](rng), rng.normal(0, 1, 2)
+        expected = phi_2_by_expm(Z)
+        error = np.abs(apply_phi_2(*Z.ravel(), *v) - expected @ v).max()
+        # where eigenvalues meet, a difference to both sides by 1e-3 stands for the derivative:
+        # it errs by 1e-6/6 of the third derivative, which is at most 1/20
+        meeting = 1e-6 / 120 * np.linalg.norm(Z - np.trace(Z) / 2 * np.eye(2)) * np.abs(v).max()
+        assert error < 1e-10 * np.abs(expected).max() * np.abs(v).max() + (
+            meeting if kind in MEETING else 0)
+
+
+@pytest.mark.parametrize('z', [0.0, 1e-9, -1e-3, -0.0199999, -0.0200001, 0.02, -1.0, 3.0, -5e4,
+                               0.01j, 0.03 - 0.04j, -2 + 7j])
+def test_phi_2_of_a_number_is_its_series_or_definition(z):
+    if abs(z) < 10:
+        terms = [1 / 2]
+        for k in range(3, 90):
+            terms.append(terms[-1] * z / k)
+        assert phi_2(z) == pytest.approx(sum(terms), rel=2e-12)
+    else:
+        assert phi_2(z) == pytest.approx((np.exp(z) - 1 - z) / z**2, rel=1e-14)
+
+
+# The clutch: one part
+
+
+@pytest.mark.parametrize('direction', BOTH)
+def test_jacobian_is_the_slope_of_the_slope(direction):
+    rng = np.random.default_rng(4)
+    for _ in range(100):
+        slope, jacobian = clutch_step(random_self_locking(rng)).flow(
+            tuple(rng.normal(0, 300, 3)), direction)
+        y, d = np.array([rng.normal(0, 30), rng.normal(0, 0.3)]), 1e-5
+        differences = np.array([
+            np.subtract(slope(*(y + e))[:2], slope(*(y - e))[:2]) / (2 * d)
+            for e in d * np.eye(2)]).T
+        assert relative_difference(np.reshape(jacobian(slope(*y)), (2, 2)), differences) < 1e-6
+
+
+SLIPPING = SelfLockingParameters(c_f1=0.5, c_f2=0.5)
+SLIPPING_TORQUE = (300.0, -100.0, -190.0)
+
+
+@pytest.mark.parametrize('order', [2, 3])
+def test_error_of_fixed_parts_falls_with_the_order(order):
+    slope, jacobian = clutch_step(SLIPPING).flow(SLIPPING_TORQUE, 1)
+    start, end = (40.0, 4.0), 0.04
+    exact = solve_ivp(lambda t, y: slope(*y)[:2], (0, end), start, 'DOP853',
+                      rtol=1e-13, atol=1e-13).y[:, -1]
+    errors = []
+    for parts in (64, 128, 256, 512):
+        y, h = np.array(start), end / parts
+        for _ in range(parts):
+            here = slope(*y)
+            d, _, c = rosenbrock_part(slope, *y, here, jacobian(here), h)
+            y = y + d + (np.array(c) if order == 3 else 0)
+        errors.append(np.abs(y - exact).max())
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert ((orders > order - 0.3) & (orders < order + 0.3)).all()
+
+
+def test_integral_over_one_part_errs_with_the_fifth_power_of_its_length():
+    step, start, errors = clutch_step(SLIPPING), (40.0, 4.0), []
+    slope, _ = step.flow(SLIPPING_TORQUE, 1)
+    for h in (4e-4, 2e-4, 1e-4):   # one part each
+        exact = solve_ivp(lambda t, z: (*slope(*z[:2])[:2], *z[:2]), (0, h), [*start, 0, 0],
+                          'DOP853', rtol=1e-13, atol=1e-17).y[2:, -1]
+        errors.append(np.abs(step.step(start, SLIPPING_TORQUE, 1, h)[1] - exact))
+    assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.5).all()   # 4 without h c/4
+
+
+@pytest.mark.parametrize('h', [1e-3, 0.1])
+@pytest.mark.parametrize('direction', BOTH)
+@pytest.mark.parametrize('slip', [2000.0, -2000.0])
+def test_step_of_a_fully_slipping_clutch_is_exact(slip, direction, h):
+    torque, y = (300.0, -120.0, -180.0), np.array([50.0, slip])
+    step = clutch_step()
+    slope, jacobian = step.flow(torque, direction)
+    here = slope(*y)
+    A = np.reshape(jacobian(here), (2, 2))
+    z = np.zeros((5, 5))   # (integral, y, 1)
+    z[:2, 2:4], z[2:4, 2:4], z[2:4, 4] = np.eye(2), A, here[:2] - A @ y
+    exact = expm(z * h) @ [0, 0, *y, 1]
+    assert exact[3] * slip > 0 and abs(exact[3]) > 20   # slips fully up to the end
+    got, integral, _, coarse = step.step(tuple(y), torque, direction, h)
+    assert relative_difference(got, exact[2:4]) < 1e-12
+    assert relative_difference(integral, exact[:2]) < 1e-12
+    assert not coarse
+
+
+@pytest.mark.parametrize('torque', [(400.0, -160.0, -240.0), (3000.0, -1000.0, -1900.0)])
+@pytest.mark.parametrize('direction', BOTH)
+def test_backward_euler_solves_its_equation_and_nears_rest_of_slip_whatever_the_step(
+        torque, direction):
+    slope, jacobian = clutch_step().flow(torque, direction)
+
+    def rest_of_slip(w):
+        return brentq(lambda s: slope(w, s)[1], -50, 50, xtol=1e-14)
+
+    for distance in (-5.0, -0.1, 1e-3, 0.1, 5.0):
+        for h in 10.0 ** np.arange(-4.0, 2):
+            start = rest_of_slip(10.0) + distance
+            here = slope(10.0, start)
+            w, slip = backward_euler(slope, 10.0, start, here, jacobian(here), h)
+            rest = rest_of_slip(w)
+            assert abs(slip - rest) < abs(start - rest)
+            # brentq stops at 1e-12 rad/s, where the slope is steep
+            assert slip - start == pytest.approx(h * slope(w, slip)[1], rel=1e-6, abs=1e-6 * h)
+
+
+def test_backward_euler_reaches_the_steady_state_in_one_long_step():
+    torque = (30.0, -10.0, -19.0)
+    slope, jacobian = clutch_step().flow(torque, 1)
+    w, slip = 150.0, 0.0
+    for _ in range(30):
+        here = slope(w, slip)
+        w, slip = backward_euler(slope, w, slip, here, jacobian(here), 1e6)
+    assert slope(w, slip)[:2] == pytest.approx((0, 0), abs=1e-3)
+
+
+def test_backward_euler_is_of_first_order():
+    slope, jacobian = clutch_step(SLIPPING).flow(SLIPPING_TORQUE, 1)
+    start, end = (40.0, 4.0), 0.02
+    exact = solve_ivp(lambda t, y: slope(*y)[:2], (0, end), start, 'DOP853',
+                      rtol=1e-12, atol=1e-12).y[:, -1]
+    errors = []
+    for parts in (40, 80, 160):
+        y = start
+        for _ in range(parts):
+            here = slope(*y)
+            y = backward_euler(slope, *y, here, jacobian(here), end / parts)
+        errors.append(np.abs(y - exact).max())
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert ((orders > 0.8) & (orders < 1.2)).all()
+
+
+def test_step_beyond_its_bound_of_work_is_coarse_stable_and_says_so(monkeypatch):
+    monkeypatch.setattr(ClutchStep, 'MOST_PARTS', 2)
+    step, torque = clutch_step(), (3000.0, -1000.0, -1900.0)
+    (w, slip), _, _, coarse = step.step((10.0, -30.0), torque, 1, 0.05)
+    monkeypatch.undo()
+    (w_fine, slip_fine), _, _, fine = step.step((10.0, -30.0), torque, 1, 0.05)
+    assert (coarse, fine) == (True, False)
+    assert abs(slip - slip_fine) < 30 and abs(w - w_fine) < 0.2 * abs(w_fine - 10)
+
+
+def test_parts_meet_the_end_of_the_step(monkeypatch):
+    taken, plain = [], steppers.rosenbrock_part
+
+    def recorded(slope, w, s, here, J, h):
+        result = plain(slope, w, s, here, J, h)
+        taken.append((h, result))
+        return result
+
+    monkeypatch.setattr(steppers, 'rosenbrock_part', recorded)
+    clutch_step().step((10.0, 3.0), (400.0, -250.0, -100.0), 1, 5e-3)
+    accepted = [h for h, ((dw, ds), _, (cw, cs)) in taken
+                if abs(cw) + abs(cs) <= 3e-4 + 1e-6 * (abs(dw) + abs(ds))]
+    assert 1 < len(accepted) < len(taken)
+    assert sum(accepted) == pytest.approx(5e-3, rel=1e-14)
+
+
+def test_error_estimate_sees_a_slip_that_reverses_within_one_part():
+    # frozen friction, steep: with parts of 0.16 ms the forward estimate vanishes by chance
+    # while the slip crosses the whole of tanh
+    p = SelfLockingParameters(c_f1=50.0, c_f2=50.0)
+    y, torque = (-20.95807993, 0.04110333), (-178.7980973, -51.90204872, 6.36334593)
+    friction = (0.0, 0.0), tuple(
+        a * M + b for a, M, b in zip(self_locking.full_friction(p)[0], (17.81272556, 26.71951208),
+                                     self_locking.full_friction(p)[1], strict=True))
+    step = clutch_step(p)
+    slope, _ = step.flow(torque, 1, friction)
+    exact = solve_ivp(lambda t, y: slope(*y)[:2], (0, 1e-3), y, 'Radau',
+                      rtol=1e-11, atol=1e-11).y[:, -1]
+    got, _, _, coarse = step.step(y, torque, 1, 1e-3, friction)
+    assert not coarse
+    assert np.abs(got - exact).max() < 1e-3
+
+
+# The clutch: whole trajectories
+
+
+class Reference:
+    """A self-locking differential by LSODA to 1e-10, tick by tick on its own state."""
+
+    def __init__(self, variant, p, h):
+        self.p, self.h, self.lagged = p, h, variant == 'lsd_lagged'
+        self.clutch, self.direction, self.y = clutch_step(p), 1, np.zeros(2)
+        self.M = (0.0, 0.0)
+
+    def friction(self):
+        """Return the friction at full slip; that of the lagged variant knows only the last M."""
+        phi, preload = self_locking.full_friction(self.p)
+        if not self.lagged:
+            return phi, preload
+        return (0.0, 0.0), tuple(a * abs(m) + b for a, m, b in
+                                 zip(phi, self.M, preload, strict=True))
+
+    def step(self, T):
+        """Return the speeds of carrier, front and rear, and their integrals over the tick."""
+        w_0, w_1, w_2 = self.speeds(self.y)
+        power_in, power_out = abs(T[0] * w_0), abs(T[1] * w_1 + T[2] * w_2)
+        if power_in or power_out:
+            self.direction = 1 if power_in > power_out else -1
+        slope, jacobian = self.clutch.flow(T, self.direction, self.friction())
+
+        def f(t, z):
+            return (*slope(z[0], z[1])[:2], z[0], z[1])
+
+        def J(t, z):
+            a, b, c, d = jacobian(slope(z[0], z[1]))
+            return [[a, b, 0, 0], [c, d, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]]
+
+        z = odeint(f, [*self.y, 0, 0], [0, self.h], Dfun=J, tfirst=True, rtol=1e-10, atol=1e-10,
+                   mxstep=5000)[-1]
+        self.y = z[:2]
+        self.M = slope(*self.y)[4:6]
+        return self.speeds(self.y), self.speeds(z[2:])
+
+    def speeds(self, y):
+        g = self.p.g_12
+        return np.array([y[0], y[0] + g / (1 + g) * y[1], y[0] - y[1] / (1 + g)])
+
+
+def steps(rng, count, dt):
+    """Yield torques to 1,000 N m that change by steps, parted at random: locked and slipping."""
+    for n in range(count):
+        if n % 25 == 0:
+            T_0, part = rng.uniform(-1000, 1000), rng.uniform(0.1, 0.7)
+            load = -T_0 * rng.uniform(0.9, 1.1)
+        yield T_0, load * part, load * (1 - part)
+
+
+def reversals(rng, count, dt):
+    """Yield loads that swing from the front to the rear and back, over the locked stretch."""
+    for n in range(count):
+        swing = 0.4 + 0.6 * np.sin(2 * np.pi * 12.3 * n * dt)
+        T_0 = 700 * np.cos(2 * np.pi * 3.1 * n * dt)
+        yield T_0, -T_0 * swing + 5, -T_0 * (1 - swing) - 3
+
+
+def rests(rng, count, dt):
+    """Yield bursts of torque between stretches of none, until slip has died away."""
+    for n in range(count):
+        yield (0.0, 0.0, 0.0) if n // 30 % 2 else tuple(rng.normal(0, 200, 3))
+
+
+def noise(rng, count, dt):
+    """Yield torques that are new in every tick."""
+    for _ in range(count):
+        yield tuple(rng.uniform(-1000, 1000, 3))
+
+
+@pytest.mark.parametrize('variant', ['lsd_ode', 'lsd_lagged'])
+@pytest.mark.parametrize('steepness', [2.0, 4.0, 50.0])
+@pytest.mark.parametrize('rate, count', [(1000, 300), (200, 120)])
+@pytest.mark.parametrize('torques', [steps, reversals, rests, noise])
+def test_clutch_follows_an_adaptive_solver_at_every_tick(torques, rate, count, steepness, variant):
+    p = SelfLockingParameters(c_f1=steepness, c_f2=steepness)
+    simulation, reference = Simulation(variant, 1 / rate, p), Reference(variant, p, 1 / rate)
+    position = np.zeros(3)
+    for T in torques(np.random.default_rng(7), count, 1 / rate):
+        snapshot = simulation.step(T)
+        speeds, integral = reference.step(T)
+        assert snapshot.power_flow == reference.direction
+        assert np.abs(snapshot.velocity[:3] - speeds).max() < 1e-3
+        assert np.abs(snapshot.position[:3] - position - integral).max() < 1e-5
+        position = np.array(snapshot.position[:3])
+    assert simulation.coarse_steps == 0
