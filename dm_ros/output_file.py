@@ -1,0 +1,60 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the tools write: the columns of a record, and files that are whole or not there."""
+
+from contextlib import contextmanager
+import os
+
+
+def column_names(simulation):
+    """Return the names of the columns of a record, as in OUT.csv."""
+    return ['time', *(f'velocity.{name}' for name in simulation.shafts),
+            *(f'position.{name}' for name in simulation.shafts),
+            *(f'torque.{name}' for name in simulation.inputs),
+            *(f'moment.{name}' for name in simulation.moments), 'power_flow']
+
+
+def as_row(snapshot):
+    """Return a ``Snapshot`` as one flat tuple in the order of ``column_names``."""
+    time, velocity, position, torque, moment, power_flow = snapshot
+    return (time, *velocity, *position, *torque, *moment, power_flow)
+
+
+@contextmanager
+def replacing(path, mode):
+    """
+    Open a file that takes the place of ``path`` in the end, but only if all went well.
+
+    What is no ordinary file, such as /dev/stdout or a pipe, is written to as it is.
+    """
+    path = os.fspath(path)
+    if path.startswith('/dev/') or os.path.exists(path) and not os.path.isfile(path):
+        with open(path, mode) as file:
+            yield file
+        return
+    folder, name = os.path.split(os.path.realpath(path))
+    unfinished = os.path.join(folder, f'.{name}.{os.getpid()}.part')
+    try:
+        file = open(unfinished, mode)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, path) from None
+    try:
+        with file:
+            yield file
+        os.replace(unfinished, os.path.join(folder, name))
+    except BaseException:
+        os.unlink(unfinished)
+        raise

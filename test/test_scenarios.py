@@ -1,0 +1,75 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The built-in loads do what their descriptions say, with the default parameters."""
+
+import numpy as np
+import pytest
+
+from dm_ros import Simulation, VARIANTS
+from dm_ros.scenarios import profile, PROFILES
+
+
+def run(variant, seconds, rate=200):
+    """Return speeds by shaft and power-flow indices over a run of the built-in load."""
+    simulation = Simulation(variant, 1 / rate)
+    load = profile(variant)
+    snapshots = [simulation.step(load(n / rate)) for n in range(seconds * rate)]
+    speeds = np.array([snapshot.velocity for snapshot in snapshots]).T
+    return (dict(zip(simulation.shafts, speeds, strict=True)),
+            np.array([snapshot.power_flow for snapshot in snapshots]))
+
+
+@pytest.mark.parametrize('seconds', [10, 20, 60])
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_shafts_turn_and_outrun_each_other_in_a_sensible_range(variant, seconds):
+    speeds, _ = run(variant, seconds)
+    first, second = Simulation(variant).outputs
+    for shaft in ('carrier', first, second):
+        assert 50.0 < np.abs(speeds[shaft]).max() < 1000.0
+    slip = speeds[first] - speeds[second]
+    assert slip.max() > 20.0 and slip.min() < -20.0
+
+
+@pytest.mark.parametrize('seconds', [10, 20, 60])
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_power_flows_in_both_directions_for_a_fair_share(variant, seconds):
+    _, flow = run(variant, seconds)
+    assert 0.1 < (flow > 0).mean() < 0.9
+
+
+@pytest.mark.parametrize('variant', [name for name in VARIANTS if name.startswith('lsd')])
+def test_the_self_locking_one_is_locked_at_times_and_slips_at_others(variant):
+    speeds, _ = run(variant, 10)
+    locked = np.abs(speeds['front'] - speeds['rear']) < 0.5
+    assert 0.1 < locked.mean() < 0.9
+
+
+def test_the_symmetric_load_is_in_phase_with_the_left_a_little_larger():
+    pinion, left, right = np.array([profile('symmetric_ode')(n / 100) for n in range(2000)]).T
+    assert (left * right >= 0.0).all() and (np.abs(left) >= np.abs(right)).all()
+    carrier = 3.517 * pinion
+    assert np.corrcoef(carrier, left + right)[0, 1] < -0.95   # opposite, but
+    assert np.abs(carrier + left + right).max() > 5.0         # not in balance
+
+
+def test_the_self_locking_loads_are_a_few_hundred_newton_metres_and_change_sign():
+    for torque in np.array([profile('lsd_ode')(n / 100) for n in range(2000)]).T:
+        assert 100.0 < torque.max() < 500.0 and -500.0 < torque.min() < -100.0
+
+
+def test_profiles_are_pure_functions_of_time():
+    for load in PROFILES.values():
+        assert load(3.7) == load(3.7) and all(type(torque) is float for torque in load(3.7))

@@ -1,0 +1,340 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tool ``simulate``: its files, its numbers, and how it refuses bad input."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from dm_ros import Simulation, VARIANTS
+from dm_ros.scenarios import profile
+from dm_ros.simulate import main
+from dm_ros.torque_table import read_torque_file, TorqueTable
+
+GOOD = 'time,pinion,left,right\n0,10,-15,-16\n0.5,-10,15,16\n1,0,0,0\n'
+TOOL = [sys.executable, '-m', 'dm_ros.simulate', '--variant', 'symmetric_ode']
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Run each test in a folder of its own that holds a good IN.csv."""
+    # the tool as a process finds the package where this one does
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(path or os.getcwd() for path in sys.path))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'IN.csv').write_text(GOOD)
+    return tmp_path
+
+
+def simulate(*arguments, variant='symmetric_ode'):
+    return main(['--variant', variant, '--torques', 'IN.csv', *arguments])
+
+
+def table(name='OUT.csv'):
+    return np.genfromtxt(name, delimiter=',', names=True, deletechars='')
+
+
+def write_profile(variant, seconds=5.0):
+    """Write the built-in load, a row each 10 ms, as IN.csv."""
+    with open('IN.csv', 'w') as file:
+        print('time', *Simulation(variant).inputs, sep=',', file=file)
+        for n in range(round(seconds * 100) + 1):
+            print(n / 100, *profile(variant)(n / 100), sep=',', file=file)
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_output_is_what_the_library_computes(variant):
+    write_profile(variant, 1.0)
+    assert simulate('--out', 'OUT.csv', '--dt', '0.01', variant=variant) == 0
+    simulation = Simulation(variant, 0.01)
+    snapshots = [simulation.snapshot()]
+    snapshots += [simulation.step(profile(variant)(n / 100)) for n in range(100)]
+    rows = np.array([np.hstack(snapshot) for snapshot in snapshots])
+    with open('OUT.csv') as file:
+        header = file.readline()
+    assert header.strip().split(',') == [
+        'time', *(f'{kind}.{name}' for kind, names in (
+            ('velocity', simulation.shafts), ('position', simulation.shafts),
+            ('torque', simulation.inputs), ('moment', simulation.moments)) for name in names),
+        'power_flow']
+    # 17 digits: bit for bit
+    assert np.array_equal(np.loadtxt('OUT.csv', delimiter=',', skiprows=1), rows)
+
+
+def test_power_flow_is_written_as_an_integer():
+    assert simulate('--out', 'OUT.csv') == 0
+    with open('OUT.csv') as file:
+        assert {line.strip().rsplit(',', 1)[1] for line in list(file)[1:]} == {'1', '-1'}
+
+
+def test_without_a_file_the_csv_goes_to_stdout_and_the_summary_to_stderr(capfd):
+    assert simulate('--out', 'OUT.csv') == 0
+    capfd.readouterr()
+    assert simulate() == 0
+    out, err = capfd.readouterr()
+    with open('OUT.csv') as file:
+        assert out == file.read()
+    assert err.startswith('simulate: 200 ticks, 1 s, final speeds in rad/s: carrier ')
+    assert err.count('\n') == 1
+
+
+def test_equal_runs_give_equal_bytes(folder):
+    write_profile('lsd_ode')
+    for name in ('a', 'b'):
+        assert simulate('--out', f'{name}.csv', '--plot', f'{name}.png', variant='lsd_ode') == 0
+    for suffix in ('csv', 'png'):
+        assert (folder / f'a.{suffix}').read_bytes() == (folder / f'b.{suffix}').read_bytes()
+
+
+@pytest.mark.parametrize('variants', [('symmetric_ode', 'symmetric_dae'), ('lsd_ode', 'lsd_dae')])
+def test_formulations_of_one_mechanism_agree(variants):
+    write_profile(variants[0])
+    rows = []
+    for variant in variants:
+        assert simulate('--out', f'{variant}.csv', variant=variant) == 0
+        rows.append(np.array(table(f'{variant}.csv')[-1].item()))
+    names = table(f'{variants[0]}.csv').dtype.names
+    speeds = [i for i, name in enumerate(names) if name.startswith('velocity')]
+    assert len(speeds) >= 4
+    np.testing.assert_allclose(rows[1][speeds], rows[0][speeds], rtol=1e-9)
+
+
+def test_the_parameter_file_counts():
+    with open('p.yaml', 'w') as file:
+        file.write('/**: {ros__parameters: {rate: 50.0, substeps: 4, power_flow_deadband: 3.0, '
+                   'symmetric.inertia.carrier: 0.2, initial_velocity: {left: 7.0, right: 8.0}}}')
+    assert simulate('--params', 'p.yaml', '--out', 'OUT.csv') == 0
+    simulation = Simulation('symmetric_ode', 1 / 50, {'symmetric.inertia.carrier': 0.2},
+                            substeps=4, power_flow_deadband=3.0, initial_velocity=(7.0, 8.0))
+    for n in range(50):
+        sign = 1 if n < 25 else -1
+        last = simulation.step((sign * 10, sign * -15, sign * -16))
+    out = table()
+    assert len(out) == 51 and out['velocity.left'][0] == 7.0
+    assert tuple(out[-1])[:6] == (last.time, *last.velocity)
+
+
+def test_the_tick_length_of_the_command_line_counts_more_than_that_of_the_file():
+    with open('p.yaml', 'w') as file:
+        file.write('/**: {ros__parameters: {rate: 50.0}}')
+    assert simulate('--params', 'p.yaml', '--dt', '0.1', '--out', 'OUT.csv') == 0
+    assert len(table()) == 11
+
+
+@pytest.mark.parametrize('dt', [0.1, 0.01, 0.001, 0.005, 1 / 3, 1 / 30, 1 / 7, 0.7, 1e-4])
+@pytest.mark.parametrize('digits', [17, 6])
+def test_rows_on_multiples_of_the_tick_start_with_their_tick(dt, digits):
+    """Also where the quotient, as 0.3/0.1, misses the integer, or a time has six decimals."""
+    times = [float(f'{n * dt:.{digits}f}') for n in range(3000)]
+    held = TorqueTable(tuple(times), tuple((n, 0, 0) for n in range(3000))).held(dt)
+    assert [torques[0] for torques in held] == list(range(2999))
+    assert [held.at(n)[0] for n in range(3005)] == [*range(3000), *[2999] * 5]
+
+
+def test_a_row_between_ticks_waits_for_the_next_tick():
+    held = TorqueTable((0.0, 0.25, 0.31, 0.34, 0.6), tuple((n,) for n in range(5))).held(0.1)
+    assert [n for n, in held] == [0, 0, 0, 1, 3, 3]
+
+
+def test_before_the_first_row_the_torques_are_zero():
+    held = TorqueTable((0.2, 0.4), ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))).held(0.1)
+    assert list(held) == [(0.0, 0.0, 0.0)] * 2 + [(1.0, 2.0, 3.0)] * 2 and len(held) == 4
+
+
+@pytest.mark.parametrize('end, ticks', [(0.3, 3), (0.349, 3), (0.351, 4), (1e5, 1_000_000)])
+def test_the_last_time_ends_the_run(end, ticks):
+    held = TorqueTable((0.0, end), ((1.0,), (2.0,))).held(0.1)
+    assert len(held) == sum(1 for _ in held) == ticks
+
+
+def test_reads_what_spreadsheets_write(folder):
+    (folder / 'x.csv').write_bytes(
+        b'\xef\xbb\xbf"right", time,"left",pinion\r\n 3,0,2, 1e0\r\n\r\n6,"1",5,4\r\n,,,\r\n')
+    assert read_torque_file('x.csv', ('pinion', 'left', 'right')) == TorqueTable(
+        (0.0, 1.0), ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
+
+
+BAD_TABLES = {
+    "IN.csv:1: column 'time': missing": '',
+    "IN.csv:1: column 'right': missing": 'time,pinion,left\n0,1,2\n1,1,2\n',
+    "IN.csv:1: column 'front': unknown": 'time,pinion,left,right,front\n0,1,2,3,4\n',
+    "IN.csv:1: column '': unknown": 'time,pinion,left,right,\n0,1,2,3,\n',
+    "IN.csv:1: column 'left': it appears twice": 'time,pinion,left,left,right\n',
+    "IN.csv:1: column 'time': a row with a time above 0 must end": 'time,pinion,left,right\n',
+    "IN.csv:2: column 'time': a row": 'time,pinion,left,right\n0,1,2,3\n',
+    "IN.csv:3: column 'left': 'abc' is not a finite number": GOOD.replace(',15', ',abc'),
+    "IN.csv:3: column 'left': '' is not a finite": GOOD.replace(',15', ','),
+    "IN.csv:3: column 'left': 'nan' is not a finite": GOOD.replace(',15', ',nan'),
+    "IN.csv:3: column 'left': '-inf' is not a finite": GOOD.replace(',15', ',-inf'),
+    "IN.csv:3: column 'left': '1e999' is not a finite": GOOD.replace(',15', ',1e999'),
+    "IN.csv:3: column 'left': '1_5' is not a finite": GOOD.replace(',15', ',1_5'),
+    "IN.csv:3: column 'time': 'x' is not a finite": GOOD.replace('0.5', 'x'),
+    "IN.csv:3: column 'time': 0.0 does not come after 0.0": GOOD.replace('0.5', '0'),
+    "IN.csv:4: column 'time': 1.0 does not come after 1.5": GOOD.replace('0.5', '1.5'),
+    "IN.csv:2: column 'time': -1.0 is negative": GOOD.replace('\n0,', '\n-1,'),
+    "IN.csv:3: column 'right': there is no cell": GOOD.replace(',15,16', ',15'),
+    "IN.csv:3: column 5: '17' has no header": GOOD.replace(',16', ',16,17'),
+    "IN.csv:4: column 'left': 'x\\ny' is not": GOOD.replace(',15', ',"x\ny"'),
+    'IN.csv:2: unexpected end of data': 'time,pinion,left,right\n"',
+}
+
+
+@pytest.mark.parametrize('message', BAD_TABLES)
+def test_a_bad_table_is_refused_by_file_line_and_column(folder, message, capfd):
+    (folder / 'IN.csv').write_text(BAD_TABLES[message])
+    refused(folder, capfd, message, '--out', 'OUT.csv', '--plot', 'OUT.png')
+
+
+def refused(folder, capfd, message, *arguments):
+    """Assert that the tool refuses in one line, and that no file changes."""
+    before = {path: path.is_file() and path.read_bytes() for path in folder.iterdir()}
+    assert simulate(*arguments) == 2
+    out, err = capfd.readouterr()
+    assert not out and err.startswith(f'simulate: error: {message}') and err.count('\n') == 1
+    assert {path: path.is_file() and path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize('message, arguments', [
+    ('dt: 0.0', ['--dt', '0']),
+    ('dt: nan', ['--dt', 'nan']),
+    ('IN.csv: time: ticks of 5 s', ['--dt', '5']),
+    ('IN.csv: time: ticks of 1e-30 s', ['--dt', '1e-30']),
+    ('none.yaml: No such file', ['--params', 'none.yaml']),
+    ('none/OUT.csv: No such file', ['--out', 'none/OUT.csv']),
+    ('.: Is a directory', ['--out', '.']),
+    ('none/OUT.png: No such file', ['--plot', 'none/OUT.png']),
+])
+def test_bad_arguments_are_refused(folder, capfd, message, arguments):
+    (folder / 'OUT.csv').write_text('precious')
+    refused(folder, capfd, message, '--out', 'OUT.csv', *arguments)
+
+
+def test_an_input_is_not_overwritten(folder, capfd):
+    refused(folder, capfd, f'{folder / "IN.csv"}: given for two files', '--out', 'IN.csv')
+
+
+def test_a_bad_parameter_is_refused_by_file_and_name(folder, capfd):
+    (folder / 'p.yaml').write_text('/**: {ros__parameters: {symmetric.inertia.left: -1.0}}')
+    refused(folder, capfd, 'p.yaml: symmetric.inertia.left: -1.0 is not allowed',
+            '--out', 'OUT.csv', '--params', 'p.yaml')
+
+
+@pytest.mark.parametrize('content, message', [
+    (None, 'IN.csv: No such file'), (b'\xff\xfe', 'IN.csv: not a text file in UTF-8')])
+def test_an_unreadable_table_is_refused(folder, capfd, content, message):
+    (folder / 'IN.csv').unlink()
+    if content:
+        (folder / 'IN.csv').write_bytes(content)
+    refused(folder, capfd, message, '--out', 'OUT.csv')
+
+
+def test_a_run_that_leaves_the_range_of_numbers_leaves_no_file(folder, capfd):
+    (folder / 'OUT.csv').write_text('precious')
+    (folder / 'IN.csv').write_text(GOOD.replace('-10', '-1e308').replace('15', '1e308'))
+    refused(folder, capfd, 'IN.csv: after ', '--out', 'OUT.csv', '--plot', 'OUT.png')
+
+
+@pytest.mark.skipif(not os.path.exists('/dev/full'), reason='needs /dev/full')
+def test_a_full_disk_is_named(folder, capfd):
+    refused(folder, capfd, '/dev/full: No space left on device', '--out', '/dev/full')
+
+
+def test_a_pipe_or_device_is_written_to_not_replaced(capfd):
+    assert simulate('--out', '/dev/stdout') == 0
+    assert capfd.readouterr().out.startswith('time,')
+    assert simulate('--out', '/dev/null') == 0
+    assert not os.path.isfile('/dev/null')
+
+
+def test_a_link_stays_a_link(folder):
+    (folder / 'there').mkdir()
+    (folder / 'OUT.csv').symlink_to('there/OUT.csv')
+    assert simulate('--out', 'OUT.csv') == 0
+    assert (folder / 'OUT.csv').is_symlink() and len(table('there/OUT.csv')) == 201
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_nothing_behind(folder, number):
+    (folder / 'IN.csv').write_text(GOOD.replace('\n1,', '\n1e6,'))
+    (folder / 'OUT.csv').write_text('precious')
+    before = set(folder.iterdir())
+    process = subprocess.Popen([*TOOL, '--torques', 'IN.csv', '--out', 'OUT.csv'],
+                               stderr=subprocess.PIPE, text=True)
+    try:
+        end = time.monotonic() + 60.0
+        while not any(path.suffix == '.part' for path in folder.iterdir()):
+            assert time.monotonic() < end and process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60.0)
+    finally:
+        process.kill()
+    assert process.returncode == 128 + number and not err
+    assert set(folder.iterdir()) == before
+    assert (folder / 'OUT.csv').read_text() == 'precious'
+
+
+def test_a_reader_that_leaves_ends_it_quietly(folder):
+    (folder / 'IN.csv').write_text(GOOD.replace('\n1,', '\n1e6,'))
+    process = subprocess.Popen([*TOOL, '--torques', 'IN.csv'], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.wait(timeout=60.0) == 128 + signal.SIGPIPE
+    with process.stderr as stderr:
+        assert not stderr.read()
+
+
+@pytest.mark.parametrize('variant', ['symmetric_dae', 'lsd_lagged'])
+def test_draws_a_picture_alone(folder, variant, capfd):
+    write_profile(variant, 1.0)
+    assert simulate('--plot', 'OUT.png', variant=variant) == 0
+    assert (folder / 'OUT.png').read_bytes().startswith(b'\x89PNG')
+    assert not capfd.readouterr().out and not (folder / 'OUT.csv').exists()
+
+
+def test_a_missing_matplotlib_is_told_before_the_run(folder, capfd, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
+    refused(folder, capfd, 'a picture needs matplotlib: pip install "dm_ros[plot]"',
+            '--plot', 'OUT.png')
+    assert simulate('--out', 'OUT.csv') == 0
+
+
+def test_argparse_errors_have_the_exit_code_2(capsys):
+    for arguments in (['--variant', 'other'], ['--dt', 'abc'], []):
+        with pytest.raises(SystemExit) as error:
+            main(arguments)
+        assert error.value.code == 2
+    with pytest.raises(SystemExit) as error:
+        main(['--help'])
+    assert error.value.code == 0 and 'OUT.csv has the columns' in capsys.readouterr().out
+
+
+def test_the_tool_loads_neither_ros_nor_matplotlib():
+    check = ('import sys, dm_ros.simulate; '
+             'assert not {"rclpy", "matplotlib"} & set(sys.modules), sys.modules')
+    subprocess.run([sys.executable, '-c', check], check=True)
+
+
+def test_speeds_stay_finite_over_a_whole_built_in_run():
+    write_profile('lsd_ode', 10.0)
+    assert simulate('--out', 'OUT.csv', variant='lsd_ode') == 0
+    assert all(math.isfinite(value) for row in table() for value in row)
