@@ -1,0 +1,367 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node ``differential``: the simulation at a fixed rate, torques in, speeds out."""
+
+import argparse
+import sys
+import threading
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import SetParametersResult
+import rclpy
+from rclpy._rclpy_pybind11 import RCLInvalidROSArgsError
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Header, Int8
+from std_srvs.srv import SetBool, Trigger
+
+from dm_ros.diagnostics import Condition, lateness_values, status
+from dm_ros.messages import (
+    LATEST_QOS,
+    never_called,
+    OUTPUT_QOS,
+    poll,
+    Polled,
+    SHARED_QOS,
+    SnapshotMessages,
+)
+from dm_ros.models import MODELS
+from dm_ros.pacing import Pacer
+from dm_ros.parameters import (
+    known_rows,
+    NodeParameters,
+)
+from dm_ros.ros_parameters import declare, given_parameters, WholeRequests
+from dm_ros.simulation import Simulation
+from dm_ros.torque_inputs import TorqueInputs
+
+HELP = """\
+A vehicle differential in real time: torques in as topics, speeds and internal moments out.
+
+  in   ~/torque/<shaft>     std_msgs/Float64          N m, one shaft
+       ~/torques            sensor_msgs/JointState    N m as effort, any shafts by name
+  out  ~/joint_states       sensor_msgs/JointState    all shafts: rad, rad/s, N m
+       ~/internal_moments   sensor_msgs/JointState    N m as effort
+       ~/power_flow         std_msgs/Int8             +1 direct, -1 reverse
+       /diagnostics         diagnostic_msgs/DiagnosticArray
+  srv  ~/reset ~/step       std_srvs/Trigger
+       ~/pause              std_srvs/SetBool
+
+  --ros-args -p variant:=lsd_ode -p rate:=500.0
+  --ros-args --params-file lsd.yaml -p variant:=lsd_dae
+
+ros2 param list /differential names all parameters, ros2 param describe tells of each.
+"""
+
+
+class DifferentialNode(Node):
+    """
+    A differential in real time.
+
+    A thread of its own keeps the rate: it sleeps to absolute deadlines of the steady clock,
+    polls the torques, steps and publishes. Parameters, services and diagnostics are served by
+    an executor and meet the loop at a lock, between two ticks.
+
+    :raises ValueError: for an unknown or impossible parameter; names it.
+    """
+
+    def __init__(self, **node_options):
+        super().__init__('differential', start_parameter_services=False, **node_options)
+        try:
+            self._declare_parameters()
+        except ValueError:
+            self.destroy_node()
+            raise
+        self._lock = threading.Lock()       # held during a tick, and to change what it uses
+        self._running = threading.Event()   # cleared while paused
+        self._running.set()
+        self._stop = threading.Event()
+        self._failure = None
+        self._thread = threading.Thread(target=self._run, name='differential loop')
+
+        simulation = self.simulation
+        self._messages = SnapshotMessages(
+            simulation.shafts, simulation.inputs, simulation.moments)
+        self._joint_states = self.create_publisher(JointState, '~/joint_states', OUTPUT_QOS)
+        self._internal_moments = self.create_publisher(
+            JointState, '~/internal_moments', OUTPUT_QOS)
+        self._power_flow = self.create_publisher(Int8, '~/power_flow', OUTPUT_QOS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', OUTPUT_QOS)
+
+        polled = Polled()
+        self._shaft_torques = [
+            (shaft, self.create_subscription(Float64, f'~/torque/{shaft}', never_called,
+                                             LATEST_QOS, callback_group=polled))
+            for shaft in simulation.inputs]
+        self._torques = self.create_subscription(
+            JointState, '~/torques', never_called, SHARED_QOS, callback_group=polled)
+
+        self.create_service(Trigger, '~/reset', self._reset)
+        self.create_service(SetBool, '~/pause', self._pause)
+        self.create_service(Trigger, '~/step', self._step)
+        self._parameter_services = WholeRequests(self)
+        # the steady clock: a timer of the ROS clock stalls when system time steps back
+        self.create_timer(1.0, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._diagnosed = 0, time.monotonic_ns()
+
+        log = self.get_logger()
+        self._missing = Condition('ticks are missed', log)
+        self._coarse = Condition('solver steps are coarse', log)
+        self._out_of_range = Condition('ticks are refused', log)
+        self._refusing = Condition('torque messages are refused', log)
+        self._clamping = Condition('torques are clamped', log)
+        self._stale = Condition('torques are too old and count as zero', log)
+        log.info(f'{simulation.variant} at {self._settings.rate:g} Hz, '
+                 f'torques on {", ".join(simulation.inputs)}')
+
+    def start(self):
+        """Begin to tick."""
+        self._thread.start()
+
+    def close(self):
+        """Stop ticking and destroy the node; raise what had stopped the loop, if anything."""
+        self._stop.set()
+        self._running.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self.destroy_node()
+        if self._failure:
+            raise self._failure
+
+    # parameters
+
+    def _declare_parameters(self):
+        known = known_rows()
+        for name in given_parameters(self):
+            if name not in known and not self.has_parameter(name):
+                raise ValueError(f'{name}: there is no such parameter')
+        settings = NodeParameters()
+        variant = given_parameters(self).get('variant', settings.variant)
+        model = MODELS[settings.changed({'variant': variant}).variant][0]
+        not_mine = [f'initial_velocity.{shaft}' for shaft in ('left', 'right', 'front', 'rear')
+                    if shaft not in model.outputs]
+        settings = declare(self, settings, lambda name: name not in not_mine)
+        parameters = declare(self, model.parameters_type())
+        self.simulation = Simulation(
+            variant, dt=1.0 / settings.rate, parameters=parameters, substeps=settings.substeps,
+            power_flow_deadband=settings.deadband,
+            initial_velocity=settings.initial_velocity(model.outputs))
+        self._settings = settings
+        self._pacer = Pacer(1e9 / settings.rate)
+        self._inputs = TorqueInputs(self.simulation.inputs, settings.torque_limit,
+                                    settings.torque_timeout * settings.rate)
+        self._prepared = settings, None
+        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_post_set_parameters_callback(self._take_parameters)
+
+    def _check_parameters(self, parameters):
+        """Refuse a request as a whole, or prepare all that it changes."""
+        changes = {parameter.name: parameter.value for parameter in parameters}
+        own, mechanism = split(changes, self._settings, self.simulation.parameters)
+        try:
+            settings = self._settings.changed(own)
+            prepared = None
+            if mechanism or settings.substeps != self._settings.substeps:
+                prepared = self.simulation.prepare(mechanism, settings.substeps)
+        except ValueError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        self._prepared = settings, prepared
+        return SetParametersResult(successful=True)
+
+    def _take_parameters(self, parameters):
+        """Put what was prepared into force between two ticks."""
+        settings, prepared = self._prepared
+        simulation, inputs = self.simulation, self._inputs
+        with self._lock:
+            self._settings = settings
+            if prepared:
+                simulation.adopt(prepared)
+            simulation.power_flow_deadband = settings.deadband
+            simulation.initial_velocity = settings.initial_velocity(simulation.outputs)
+            inputs.limit = settings.torque_limit
+            inputs.timeout = settings.torque_timeout * settings.rate
+
+    # services
+
+    def _reset(self, request, response):
+        with self._lock:
+            self.simulation.reset()
+            self._inputs.forget()
+            self._publish()
+        response.success = True
+        return response
+
+    def _pause(self, request, response):
+        with self._lock:
+            if request.data:
+                self._running.clear()
+            else:
+                self._running.set()
+        response.success = True
+        response.message = 'paused' if request.data else 'running'
+        return response
+
+    def _step(self, request, response):
+        with self._lock:
+            response.success = not self._running.is_set()
+            if response.success:
+                self._tick()
+                response.message = f'time {self.simulation.time:.9g} s'
+            else:
+                response.message = 'only while paused, see ~/pause'
+        return response
+
+    # the loop
+
+    def _run(self):
+        pacer = self._pacer
+        try:
+            pacer.restart(time.monotonic_ns())
+            while not self._stop.is_set():
+                if not self._running.is_set():
+                    self._running.wait()
+                    pacer.restart(time.monotonic_ns())
+                    continue
+                delay = (pacer.due - time.monotonic_ns()) * 1e-9
+                if delay > 0.5:
+                    self._stop.wait(delay - 0.4)   # not to be late for the stop either
+                    continue
+                if delay > 0.0:
+                    time.sleep(delay)
+                with self._lock:
+                    if self._running.is_set():
+                        pacer.begin(time.monotonic_ns())
+                        self._tick()
+        except Exception as error:
+            if self.context.ok():   # otherwise it is the shutdown that broke a call
+                self._failure = error
+                self.context.try_shutdown()
+
+    def _tick(self):
+        """Take the torques that came, advance one tick and publish; the lock is held."""
+        tick = self.simulation.ticks
+        for shaft, subscription in self._shaft_torques:
+            for message, _ in poll(subscription):
+                self._demand((shaft,), (message.data,), tick, f'torque/{shaft}')
+        for message, _ in poll(self._torques):
+            self._demand(message.name, message.effort, tick, 'torques')
+        try:
+            self.simulation.advance(self._inputs.in_force(tick))
+        except ValueError as error:
+            self._out_of_range.happened(str(error))
+        self._publish()
+
+    def _demand(self, names, torques, tick, topic):
+        try:
+            if self._inputs.demand(names, torques, tick):
+                self._clamping.happened(f'~/{topic}: beyond {self._inputs.limit:g} N m')
+        except ValueError as error:
+            self._refusing.happened(f'~/{topic}: {error}')
+
+    def _publish(self):
+        messages = self._messages
+        messages.fill(self.simulation.snapshot(), *self.get_clock().now().seconds_nanoseconds())
+        self._joint_states.publish(messages.joint_states)
+        self._internal_moments.publish(messages.internal_moments)
+        self._power_flow.publish(messages.power_flow)
+
+    # diagnostics
+
+    def _diagnose(self):
+        simulation, pacer, inputs = self.simulation, self._pacer, self._inputs
+        ticks, now = pacer.ticks, time.monotonic_ns()
+        (ticks_before, before), self._diagnosed = self._diagnosed, (ticks, now)
+        paused = not self._running.is_set()
+        stale = inputs.stale(simulation.ticks)
+        if pacer.missed > self._missing.count:
+            times = pacer.missed - self._missing.count
+            self._missing.happened(f'{times} since the last report', times)
+        if simulation.coarse_steps > self._coarse.count:
+            times = simulation.coarse_steps - self._coarse.count
+            self._coarse.happened('their work reached its bound', times)
+        if stale:
+            self._stale.happened(', '.join(stale))
+        loop = (self._missing, self._coarse, self._out_of_range)
+        demands = (self._refusing, self._clamping, self._stale)
+        self._diagnostics.publish(DiagnosticArray(
+            header=Header(stamp=self.get_clock().now().to_msg()),
+            status=[
+                status(f'{self.get_name()}: loop', [c for c in loop if c.active],
+                       'paused' if paused else 'running', {
+                    'variant': simulation.variant,
+                    'rate wanted [Hz]': f'{self._settings.rate:g}',
+                    'rate held [Hz]': f'{(ticks - ticks_before) / (now - before) * 1e9:.2f}',
+                    **lateness_values(pacer.take_lateness()),
+                    'ticks': ticks,
+                    'missed ticks': pacer.missed,
+                    'refused ticks': self._out_of_range.count,
+                    'coarse solver steps': simulation.coarse_steps,
+                    'simulated time [s]': f'{simulation.time:.9g}'}),
+                status(f'{self.get_name()}: torques', [c for c in demands if c.active],
+                       'no torque yet' if len(inputs.silent()) == len(inputs.shafts) else 'fine', {
+                    'received messages': inputs.received,
+                    'refused messages': inputs.refused,
+                    'last refused': self._refusing.reason or 'none',
+                    'clamped messages': inputs.clamped,
+                    'stale': ', '.join(stale) or 'none',
+                    'without any torque yet': ', '.join(inputs.silent()) or 'none'})]))
+        for condition in (*loop, *demands):
+            condition.settle()
+
+
+def split(changes, *tables):
+    """Return one dict for each table of parameters, with those changes that are its own."""
+    return [{name: value for name, value in changes.items() if name in table.named()}
+            for table in tables]
+
+
+def parser():
+    """Return the parser of what is not for ROS on the command line."""
+    return argparse.ArgumentParser(
+        'differential', description=HELP, formatter_class=argparse.RawDescriptionHelpFormatter)
+
+
+def main(args=None):
+    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    args = sys.argv if args is None else ['differential', *args]
+    node = None
+    try:
+        parser().parse_args(remove_ros_args(args)[1:])
+        rclpy.init(args=args)
+        node = DifferentialNode()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        node.start()
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (ValueError, ParameterException, RCLInvalidROSArgsError) as error:
+        print('differential: error:', ' '.join(str(error).split()), file=sys.stderr)
+        return 2
+    finally:
+        if node:
+            node.close()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

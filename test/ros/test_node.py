@@ -1,0 +1,303 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node ``differential`` over real topics, in a domain of its own."""
+
+from array import array
+import math
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray
+import pytest
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+import rclpy
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Int8
+from std_srvs.srv import SetBool, Trigger
+
+from dm_ros import Simulation, VARIANTS
+from dm_ros.parameters import NodeParameters, SelfLockingParameters, SymmetricParameters
+
+CONFIG = Path(__file__).parents[2] / 'config'
+
+
+def as_messages(**parameters):
+    return [Parameter(name.replace('__', '.'), value=value).to_parameter_msg()
+            for name, value in parameters.items()]
+
+
+def keys(diagnostics, which):
+    """Return the values of the newest status whose name ends so, and its message."""
+    status = [s for s in diagnostics[-1].status if s.name.endswith(which)][0]
+    return {pair.key: pair.value for pair in status.values}, status.message
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_a_tick_publishes_all_shafts_and_moments_by_name_with_one_stamp(ros, variant):
+    node = ros.differential(variant)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    moments = ros.listen(JointState, '/differential/internal_moments')
+    flow = ros.listen(Int8, '/differential/power_flow')
+    ros.until(lambda: len(joints) > 5 and len(moments) > 5 and len(flow) > 5)
+    names = Simulation(variant)
+    assert tuple(joints[-1].name) == names.shafts
+    assert tuple(moments[-1].name) == names.moments
+    assert len(joints[-1].position) == len(joints[-1].velocity) == len(joints[-1].effort) \
+        == len(names.shafts)
+    assert len(moments[-1].effort) == len(names.moments)
+    assert flow[-1].data == 1
+    stamps = {(m.header.stamp.sec, m.header.stamp.nanosec) for m in joints}
+    assert len(stamps) == len(joints)
+    assert stamps & {(m.header.stamp.sec, m.header.stamp.nanosec) for m in moments}
+    assert node.get_name() == 'differential'
+
+
+def test_a_constant_torque_gives_the_acceleration_of_the_equations(ros):
+    ros.differential(torque_timeout=0.0)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    ros.publisher(JointState, '/differential/torques').publish(
+        JointState(name=['pinion', 'left', 'right'], effort=[10.0, -15.0, -15.0]))
+    ros.until(lambda: len([m for m in joints if m.effort[3] == 10.0]) > 10)
+    loaded = [m for m in joints if m.effort[3] == 10.0]
+    assert list(loaded[0].effort) == [0.0, -15.0, -15.0, 10.0, 0.0]
+    # (18)-(20) at rest with equal wheels: (I_1Sigma + I_2Sigma) e = T_Sigma
+    eta_0 = 0.975 * 0.995
+    inertia = 0.1 / 0.975 + 2 * 1.8e-4 / (eta_0 * 0.99) + 1.56e-4 * 3.517**2 * 0.995
+    torque = 10.0 * 3.517 * 0.995 - 30.0 / (eta_0 * 0.99)
+    tick = 1 / 200
+    assert loaded[0].velocity[1] == pytest.approx(torque / inertia * tick, rel=1e-3)
+    assert loaded[0].velocity[1] == pytest.approx(loaded[0].velocity[2], rel=1e-12)
+    # and exactly what the library gives
+    simulation = Simulation('symmetric_ode', tick)
+    for message in loaded:
+        assert message.velocity == array('d', simulation.step((10.0, -15.0, -15.0)).velocity)
+
+
+def test_each_shaft_has_its_own_topic(ros):
+    node = ros.differential('lsd_ode', torque_timeout=0.0)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    for value, shaft in enumerate(('carrier', 'front', 'rear'), start=1):
+        ros.publisher(Float64, f'/differential/torque/{shaft}').publish(
+            Float64(data=float(value)))
+    ros.until(lambda: joints and list(joints[-1].effort) == [1.0, 2.0, 3.0, 0.0])
+    assert node.simulation.snapshot().torque == (1.0, 2.0, 3.0)
+
+
+def test_two_controllers_share_the_torques_topic_within_a_tick(ros):
+    ros.differential(torque_timeout=0.0, rate=5.0)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    one = ros.publisher(JointState, '/differential/torques')
+    other = ros.publisher(JointState, '/differential/torques')
+    one.publish(JointState(name=['pinion'], effort=[1.0]))
+    other.publish(JointState(name=['left', 'right'], effort=[2.0, 3.0]))
+    ros.until(lambda: joints and list(joints[-1].effort) == [0.0, 2.0, 3.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize('names, efforts, why', [
+    (['pinion', 'left'], [5.0, math.nan], 'nan'),
+    (['pinion', 'left'], [5.0, -math.inf], 'inf'),
+    (['pinion', 'wheel'], [5.0, 5.0], 'wheel'),
+    (['pinion', 'pinion'], [5.0, 5.0], 'twice'),
+    (['pinion', 'left'], [5.0], '2 names'),
+    (['pinion'], [], '0 torques'),
+])
+def test_a_bad_message_is_refused_whole_and_the_node_goes_on(ros, names, efforts, why):
+    node = ros.differential(torque_timeout=0.0)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    torques = ros.publisher(JointState, '/differential/torques')
+    torques.publish(JointState(name=['pinion', 'left'], effort=[1.0, 2.0]))
+    ros.until(lambda: joints and joints[-1].effort[3] == 1.0)
+    torques.publish(JointState(name=names, effort=efforts))
+    ros.until(lambda: diagnostics and keys(diagnostics, 'torques')[0]['refused messages'] == '1')
+    values, message = keys(diagnostics, 'torques')
+    assert why in values['last refused']
+    assert 'refused' in message
+    ticks = node.simulation.ticks
+    ros.until(lambda: node.simulation.ticks > ticks + 3)
+    assert node.simulation.snapshot().torque == (1.0, 2.0, 0.0)
+
+
+def test_a_torque_beyond_the_limit_is_clamped_and_counted(ros):
+    ros.differential(torque_timeout=0.0, torque_limit=20.0)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    ros.publisher(Float64, '/differential/torque/left').publish(Float64(data=-1e308))
+    ros.until(lambda: joints and joints[-1].effort[1] == -20.0)
+    ros.until(lambda: diagnostics and keys(diagnostics, 'torques')[0]['clamped messages'] == '1')
+
+
+def test_a_torque_that_is_not_renewed_becomes_zero(ros):
+    ros.differential(torque_timeout=0.1, rate=100.0)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    ros.publisher(Float64, '/differential/torque/left').publish(Float64(data=1.0))
+    ros.until(lambda: any(m.effort[1] for m in joints) and joints[-1].effort[1] == 0.0)
+    # the tick it came in and ten more
+    assert sum(m.effort[1] == 1.0 for m in joints) == 11
+    ros.until(lambda: diagnostics and keys(diagnostics, 'torques')[0]['stale'] == 'left')
+
+
+@pytest.mark.parametrize('variant, table', [
+    ('symmetric_dae', SymmetricParameters), ('lsd_lagged', SelfLockingParameters)])
+def test_every_parameter_has_its_default_a_description_a_unit_and_a_range(
+        ros, variant, table):
+    ros.differential(variant)
+    rows = {**dict(table.rows().values()), **dict(NodeParameters.rows().values())}
+    listed = ros.call(ListParameters, '/differential/list_parameters').result.names
+    mine = [name for name in rows if name in listed]
+    assert set(dict(table.rows().values())) <= set(mine)
+    assert {'initial_velocity.' + shaft for shaft in Simulation(variant).outputs} <= set(mine)
+    described = ros.call(DescribeParameters, '/differential/describe_parameters', names=mine)
+    values = ros.call(GetParameters, '/differential/get_parameters', names=mine)
+    defaults = {**table().named(), **NodeParameters(variant=variant).named()}
+    for name, d, value in zip(mine, described.descriptors, values.values, strict=True):
+        entry = rows[name]
+        assert d.description.startswith(entry.description)
+        assert entry.unit in ('', '1') or entry.unit in d.description
+        assert d.read_only == (name in ('variant', 'mode', 'rate'))
+        if entry.kind is float:
+            assert value.double_value == defaults[name]
+            assert (d.floating_point_range[0].from_value, d.floating_point_range[0].to_value) \
+                == (entry.low, entry.high)
+        elif entry.kind is int:
+            assert value.integer_value == defaults[name]
+            assert (d.integer_range[0].from_value, d.integer_range[0].to_value) \
+                == (entry.low, entry.high)
+
+
+@pytest.mark.parametrize('service', ['set_parameters', 'set_parameters_atomically'])
+@pytest.mark.parametrize('bad, why', [
+    ({'lsd.efficiency.rear_mesh': 1.5}, 'lsd.efficiency.rear_mesh'),
+    ({'lsd.inertia.carrier': 0.0}, 'lsd.inertia.carrier'),
+    ({'lsd.clutch.rear.friction_coefficient': 0.5}, 'locks itself'),
+    ({'lsd.inertia.wheel': 1.0}, 'lsd.inertia.wheel'),
+    ({'rate': 100.0}, 'rate'),
+    ({'lsd.inertia.front': 1}, 'lsd.inertia.front'),
+])
+def test_a_request_with_one_impossible_parameter_changes_nothing(ros, service, bad, why):
+    node = ros.differential('lsd_ode')
+    before = node.simulation.parameters
+    kind = SetParameters if service == 'set_parameters' else SetParametersAtomically
+    response = ros.call(kind, f'/differential/{service}', parameters=as_messages(
+        lsd__clutch__rear__preload=50.0, substeps=3, **bad))
+    results = response.results if service == 'set_parameters' else [response.result]
+    assert not any(result.successful for result in results)
+    assert all(why in result.reason for result in results)
+    values = ros.call(GetParameters, '/differential/get_parameters',
+                      names=['lsd.clutch.rear.preload', 'substeps']).values
+    assert (values[0].double_value, values[1].integer_value) == (100.0, 1)
+    assert node.simulation.parameters == before
+    assert node.simulation.substeps == 1
+
+
+def test_parameters_that_are_only_possible_together_are_taken_together(ros):
+    node = ros.differential('lsd_ode')
+    response = ros.call(
+        SetParameters, '/differential/set_parameters', parameters=as_messages(
+            lsd__clutch__rear__friction_coefficient=0.5, lsd__pressure_angle=0.1, substeps=2))
+    assert [result.successful for result in response.results] == [True] * 3
+    assert (node.simulation.parameters.mu_2, node.simulation.parameters.alpha) == (0.5, 0.1)
+    assert node.simulation.substeps == 2
+
+
+def test_a_change_of_parameters_while_turning_moves_no_shaft(ros):
+    node = ros.differential('lsd_dae', torque_timeout=0.0, initial_velocity__front=50.0,
+                            initial_velocity__rear=40.0)
+    ros.call(SetBool, '/differential/pause', data=True)
+    before = node.simulation.snapshot()
+    ros.call(SetParameters, '/differential/set_parameters', parameters=as_messages(
+        lsd__crown_radius__rear=0.07, lsd__clutch__rear__radius=0.07))
+    after = node.simulation.snapshot()
+    assert after.velocity[1:3] == pytest.approx(before.velocity[1:3], rel=1e-14)
+    assert after.position == before.position
+    assert node.simulation.parameters.g_12 == pytest.approx(0.07 / 0.04)
+
+
+def test_pause_stops_time_and_step_gives_one_tick(ros):
+    node = ros.differential(torque_timeout=0.0)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    ros.until(lambda: len(joints) > 3)
+    assert not ros.call(Trigger, '/differential/step').success
+    assert ros.call(SetBool, '/differential/pause', data=True).success
+    ticks = node.simulation.ticks
+    ros.publisher(Float64, '/differential/torque/left').publish(Float64(data=1.0))
+    ros.until(lambda: ros.call(Trigger, '/differential/step').success
+              and node.simulation.snapshot().torque == (0.0, 1.0, 0.0))
+    stepped = node.simulation.ticks
+    assert stepped > ticks
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    ros.until(lambda: diagnostics and keys(diagnostics, 'loop')[1] == 'paused')
+    assert node.simulation.ticks == stepped
+    missed = keys(diagnostics, 'loop')[0]['missed ticks']
+    ros.call(SetBool, '/differential/pause', data=False)
+    ros.until(lambda: node.simulation.ticks > stepped + 3)
+    diagnostics.clear()
+    ros.until(lambda: diagnostics)
+    assert int(keys(diagnostics, 'loop')[0]['missed ticks']) - int(missed) < 200
+
+
+def test_reset_goes_back_to_the_start(ros):
+    node = ros.differential(torque_timeout=0.0, initial_velocity__left=3.0)
+    ros.publisher(Float64, '/differential/torque/pinion').publish(Float64(data=5.0))
+    ros.until(lambda: node.simulation.snapshot().torque == (5.0, 0.0, 0.0))
+    ros.call(SetBool, '/differential/pause', data=True)
+    assert ros.call(Trigger, '/differential/reset').success
+    assert node.simulation.snapshot() == Simulation(
+        'symmetric_ode', initial_velocity=(3.0, 0.0)).snapshot()
+
+
+def test_diagnostics_tell_the_rate_the_lateness_and_the_inputs(ros):
+    ros.differential(rate=100.0)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    ros.until(lambda: len(diagnostics) > 1)
+    loop, _ = keys(diagnostics, 'loop')
+    torques, message = keys(diagnostics, 'torques')
+    assert loop['rate wanted [Hz]'] == '100'
+    assert float(loop['rate held [Hz]']) > 0.0
+    latenesses = [float(loop[f'lateness {which} [us]']) for which in ('p50', 'p99', 'max')]
+    assert latenesses == sorted(latenesses)
+    assert int(loop['ticks']) > 0
+    assert message == 'no torque yet'
+    assert torques['without any torque yet'] == 'pinion, left, right'
+
+
+def test_several_differentials_live_in_their_namespaces(ros):
+    ros.differential(arguments=['--ros-args', '-r', '__ns:=/front_axle'])
+    ros.differential('lsd_ode', arguments=['--ros-args', '-r', '__node:=centre'])
+    front = ros.listen(JointState, '/front_axle/differential/joint_states')
+    centre = ros.listen(JointState, '/centre/joint_states')
+    ros.until(lambda: front and centre)
+    assert (len(front[0].name), len(centre[0].name)) == (5, 4)
+
+
+@pytest.mark.parametrize('name, table', [
+    ('symmetric.yaml', SymmetricParameters), ('lsd.yaml', SelfLockingParameters)])
+def test_ros_reads_the_default_files_as_the_defaults(ros, name, table):
+    node = rclpy.create_node(
+        'differential', context=ros.context, automatically_declare_parameters_from_overrides=True,
+        cli_args=['--ros-args', '--params-file', str(CONFIG / name)])
+    try:
+        values = {full_name: node.get_parameter(full_name).value for full_name in table().named()}
+    finally:
+        node.destroy_node()
+    assert values == table().named()

@@ -1,0 +1,63 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Deadlines are absolute, and what was missed is skipped and counted."""
+
+import pytest
+
+from dm_ros.pacing import Pacer
+
+
+def test_deadlines_do_not_add_up_rounding():
+    pacer = Pacer(1e9 / 300)
+    pacer.restart(0)
+    for _ in range(300 * 3600):
+        pacer.begin(pacer.due)
+    assert pacer.due == pytest.approx(3600e9 + 1e9 / 300, abs=1)
+    assert pacer.missed == 0
+
+
+def test_a_late_tick_moves_no_later_deadline():
+    pacer = Pacer(1000)
+    pacer.restart(0)
+    pacer.begin(1999)
+    assert pacer.due == 2000
+    assert pacer.missed == 0
+
+
+@pytest.mark.parametrize('late, missed, due', [(1000, 1, 3000), (2999, 2, 4000), (10**9, 10**6,
+                                                                                1000002000)])
+def test_whole_periods_are_skipped_and_counted_without_a_burst(late, missed, due):
+    pacer = Pacer(1000)
+    pacer.restart(0)
+    pacer.begin(pacer.due + late)
+    assert (pacer.missed, pacer.ticks, pacer.due) == (missed, 1, due)
+
+
+def test_a_restart_misses_nothing():
+    pacer = Pacer(1000)
+    pacer.restart(0)
+    pacer.begin(pacer.due)
+    pacer.restart(10**9)
+    assert (pacer.due, pacer.missed) == (10**9 + 1000, 0)
+
+
+def test_lateness_is_that_of_the_ticks_since_the_last_question():
+    pacer = Pacer(1000)
+    pacer.restart(0)
+    for late in (30, 10, 20):
+        pacer.begin(pacer.due + late)
+    assert pacer.take_lateness() == [10, 20, 30]
+    assert pacer.take_lateness() == []
