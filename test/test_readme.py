@@ -1,0 +1,102 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the README says is what the code does: tables, versions, commands."""
+
+from pathlib import Path
+import re
+from xml.etree import ElementTree
+
+import yaml
+
+from dm_ros import Simulation, VARIANTS
+from dm_ros.parameters import NodeParameters, SelfLockingParameters, SymmetricParameters
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / 'README.md').read_text()
+
+
+def parameter_table():
+    """Return the lines of the README's table of parameters."""
+    lines = ['| name | default | unit | allowed | |', '|---|---|---|---|---|']
+    for table in (NodeParameters(), SymmetricParameters(), SelfLockingParameters()):
+        for symbol, (name, entry) in table.rows().items():
+            value = getattr(table, symbol)
+            default = f'{value:.10g}' if entry.kind is float else f'{value}'
+            if entry.kind is float and not re.search(r'[.e]', default):
+                default += '.0'
+            allowed = entry.allowed.removeprefix('in ')
+            words = entry.description + (' (read-only)' if entry.read_only else '')
+            unit = '' if entry.unit == '1' else entry.unit
+            lines.append(f'| `{name}` | `{default}` | {unit} | {allowed} | {words} |')
+    return lines
+
+
+def test_the_table_of_parameters_is_that_of_the_code():
+    lines = parameter_table()
+    assert '\n'.join(lines) in README, '\n'.join(lines)
+
+
+def test_the_table_of_variants_is_that_of_the_code():
+    for variant in VARIANTS:
+        simulation = Simulation(variant)
+        inputs = ', '.join(f'`{name}`' for name in simulation.inputs)
+        line = re.search(rf'^\| `{variant}` \|.*$', README, re.MULTILINE).group()
+        assert f'| {inputs} |' in line
+
+
+def test_all_shafts_and_moments_are_named():
+    for variant in VARIANTS:
+        simulation = Simulation(variant)
+        for name in (*simulation.shafts, *simulation.moments):
+            assert f'`{name}`' in README
+
+
+def test_the_changelog_begins_with_the_version_of_the_package():
+    version = ElementTree.parse(ROOT / 'package.xml').getroot().findtext('version')
+    changelog = (ROOT / 'CHANGELOG.rst').read_text()
+    assert re.search(r'^(\d+\.\d+\.\d+) \(', changelog, re.MULTILINE).group(1) == version
+
+
+def test_every_file_that_is_linked_is_there():
+    links = re.findall(r'\]\(([^)#:]+)\)', README)
+    assert links
+    for link in links:
+        assert (ROOT / link).exists(), link
+
+
+def test_every_make_target_that_is_named_is_there():
+    targets = set(re.findall(r'^([a-z-]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
+    assert set(re.findall(r'make ([a-z][a-z-]*)', README)) <= targets
+
+
+def test_every_dependency_of_setup_has_its_rosdep_key():
+    root = ElementTree.parse(ROOT / 'package.xml').getroot()
+    keys = {e.text for e in root if e.tag.endswith('depend')}
+    imported = set()
+    for source in (ROOT / 'dm_ros').glob('*.py'):
+        imported |= set(re.findall(r'^ *(?:import|from) (\w+)', source.read_text(), re.MULTILINE))
+    of_rosdep = {'numpy': 'python3-numpy', 'scipy': 'python3-scipy', 'yaml': 'python3-yaml',
+                 'tqdm': 'python3-tqdm', 'matplotlib': 'python3-matplotlib'}
+    for module in imported:
+        if module in of_rosdep or module.endswith('_msgs') or module in ('rclpy', 'std_srvs'):
+            assert of_rosdep.get(module, module) in keys, module
+
+
+def test_the_parameter_files_are_yaml_with_the_wildcard_of_ros():
+    for name in ('symmetric', 'lsd'):
+        content = yaml.safe_load((ROOT / 'config' / f'{name}.yaml').read_text())
+        assert list(content) == ['/**']
+        assert list(content['/**']) == ['ros__parameters']
