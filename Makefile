@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test lint colcon test-jazzy-versions clean
+.PHONY: help setup run test test-long lint bench colcon test-jazzy-versions clean
 
 PYTHON = python3
 VARIANT = symmetric_ode
@@ -8,6 +8,7 @@ DURATION = 10
 RATE = 200
 OUT = run
 PYTEST_ARGS =
+BENCH_ARGS =
 
 # The interpreter beneath any virtual environment, and where rclpy comes from:
 # `ros`, a sourced ROS 2 in which it imports, or `pypi`, the wheels.
@@ -18,8 +19,9 @@ PACKAGING := Makefile package.xml setup.cfg setup.py
 # pip writes console scripts to bin/ whatever setup.cfg says, if it builds by PEP 517.
 PIP_INSTALL := bin/pip install --quiet --use-pep517
 
-# What .venv-lint, .venv-colcon and .venv-jazzy hold.
+# What .venv-lint, .venv-bench, .venv-colcon and .venv-jazzy hold.
 lint := ruff==0.17.6
+bench := --editable . mujoco==4.0.0 control==0.10.2
 colcon := colcon-common-extensions ros-jazzy-ament-package 'setuptools<80' wheel
 jazzy := --editable '.[test]' numpy==1.26.4 scipy==1.11.4
 
@@ -56,6 +58,12 @@ run: setup  ## run the demo: VARIANT, DURATION in s, RATE in Hz, OUT a folder
 test: setup  ## run the tests: PYTEST_ARGS
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \
 	  .venv/bin/python -m pytest $(PYTEST_ARGS)
+
+test-long: setup  ## run the long tests: random parameters by the 100,000, a day of simulated time
+	.venv/bin/python -m pytest -s test/long $(PYTEST_ARGS)
+
+bench: .venv-bench/done  ## measure what a step costs, beside other tools, and how exact it is: BENCH_ARGS
+	env -u PYTHONPATH .venv-bench/bin/python bench/step.py $(BENCH_ARGS)
 
 lint: .venv-lint/done  ## check the style
 	.venv-lint/bin/ruff check

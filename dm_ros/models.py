@@ -109,8 +109,11 @@ class SelfLockingModel:
         self._lagged = formulation.lagged
         self._g_12, self._g_2s = parameters.g_12, parameters.g_2s
         self._full_friction = self_locking.full_friction(parameters)
-        self._stepper = ClutchStep(responses_of(formulation(parameters)),
-                                   self_locking.slip_steepness(parameters), self._full_friction)
+        # |M| of the last step feeds the friction of the next, which amplifies errors
+        tolerance = ClutchStep.TOLERANCE / 5 if self._lagged else ClutchStep.TOLERANCE
+        self._stepper = ClutchStep(
+            responses_of(formulation(parameters)), self_locking.slip_steepness(parameters),
+            self._full_friction, tolerance)
 
     def independent(self, omega_1, omega_2):
         """Return x and the memory, without torques, for given speeds of the output shafts."""

@@ -20,6 +20,7 @@ Nothing here depends on measured time: equal inputs give equal bits.
 """
 
 import math
+from operator import add
 from typing import NamedTuple
 
 from dm_ros.models import MODELS, VARIANTS
@@ -242,7 +243,7 @@ class Simulation:
             self._direction)
 
     def _positions(self, model):
-        return tuple([a + b for a, b in zip(self._origin, model.all_shafts(self._integral))])
+        return tuple(map(add, self._origin, model.all_shafts(self._integral)))
 
     def _checked_torques(self, torques):
         try:
@@ -251,6 +252,8 @@ class Simulation:
         except (TypeError, ValueError, OverflowError):
             raise ValueError(f'torques: {torques!r} must be three numbers, '
                              f'for {", ".join(self.inputs)}') from None
+        if math.isfinite(torque[0] + torque[1] + torque[2]):   # as nearly always
+            return torque
         for name, value in zip(self.inputs, torque):
             if not math.isfinite(value):
                 raise ValueError(f'torques: {value!r} for {name} is not a finite number')

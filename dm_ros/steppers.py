@@ -175,13 +175,13 @@ class ClutchStep:
     and ``coarse`` says so.
     """
 
-    TOLERANCE = 3e-4        # rad/s, error estimate allowed in one part
+    TOLERANCE = 1e-4        # rad/s, error estimate allowed in one part
     RELATIVE = 1e-6         # of the change of speed in the part
     BACKWARD = 3.0          # times that, for the estimate seen from the end
     SAFETY, SHRINK, GROW = 0.8, 0.1, 5.0
-    MOST_PARTS = 100
+    MOST_PARTS = 200
 
-    def __init__(self, responses, steepness, full_friction):
+    def __init__(self, responses, steepness, full_friction, tolerance=TOLERANCE):
         """
         Make the step.
 
@@ -189,7 +189,9 @@ class ClutchStep:
         :param steepness: ``(a_1, a_2)``, s/rad, friction grows with tanh(a_k slip).
         :param full_friction: ``((phi_1, phi_2), (F_s1, F_s2))`` at full slip: the proportional
             factors tan(alpha) f_k and the static moments, N m.
+        :param tolerance: rad/s, error estimate allowed in one part.
         """
+        self._tolerance = tolerance
         self._speed = {direction: tuple(np.hstack([r.A, r.C, r.P, r.W]).ravel().tolist())
                        for direction, r in responses.items()}
         self._torque = {direction: tuple(np.vstack([r.B, r.Q]).ravel().tolist())
@@ -279,7 +281,7 @@ class ClutchStep:
         J = jacobian(here)
         for _ in range(self.MOST_PARTS):
             (dw, ds), (aw, as_), (cw, cs) = rosenbrock_part(slope, w, s, here, J, part)
-            allowed = self.TOLERANCE + self.RELATIVE * (abs(dw) + abs(ds))
+            allowed = self._tolerance + self.RELATIVE * (abs(dw) + abs(ds))
             error = (abs(cw) + abs(cs)) / allowed
             if error <= 1.0:
                 there = slope(w + dw + cw, s + ds + cs)
