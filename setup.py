@@ -50,5 +50,6 @@ setup(
             'play_torques = dm_ros.play_torques:main',
             'simulate = dm_ros.simulate:main',
         ],
+        'pytest11': ['dm_ros = dm_ros.pytest_plugin'],
     },
 )

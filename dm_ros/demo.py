@@ -29,11 +29,12 @@ import subprocess
 import sys
 import time
 
-from dm_ros.domain import free_domain
+from dm_ros.domain import own_domain
 from dm_ros.models import VARIANTS
+from dm_ros.output_file import write_csv
 from dm_ros.plot import save_plot
 from dm_ros.progress import progress
-from dm_ros.recorder import Recorder, write_csv
+from dm_ros.recorder import Recorder
 
 PATIENCE = 30.0   # s, until the processes have found each other
 
@@ -147,12 +148,13 @@ def main(args=None):
     """Run the demo; return the exit code."""
     arguments = parser().parse_args(args)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_DOMAIN_ID'] = str(free_domain())
     # a SIGTERM ends the processes as well
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     try:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        recorder = record(arguments)
+        with own_domain() as domain:
+            os.environ['ROS_DOMAIN_ID'] = str(domain)
+            recorder = record(arguments)
         columns = recorder.columns(arguments.duration)
         csv = arguments.out / f'{arguments.variant}.csv'
         png = arguments.out / f'{arguments.variant}.png'

@@ -18,7 +18,7 @@
 from array import array
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int8
 
@@ -26,6 +26,10 @@ OUTPUT_QOS = QoSProfile(depth=10)   # reliable, so that every subscriber hears i
 # best effort hears every publisher; several controllers may share ~/torques within a tick
 LATEST_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 SHARED_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+# in lockstep nothing may be lost: not a tick, not its answer
+LOCKSTEP_INPUT_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+LOCKSTEP_OUTPUT_QOS = QoSProfile(depth=10_000)
 
 
 class Polled(CallbackGroup):

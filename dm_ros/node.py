@@ -29,13 +29,23 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
+from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Header, Int8
 from std_srvs.srv import SetBool, Trigger
 
 from dm_ros.diagnostics import Condition, lateness_values, status
+from dm_ros.loops import (
+    ask_for_priority,
+    Control,
+    follow_messages,
+    follow_ros_clock,
+    follow_steady_clock,
+)
 from dm_ros.messages import (
     LATEST_QOS,
+    LOCKSTEP_INPUT_QOS,
+    LOCKSTEP_OUTPUT_QOS,
     never_called,
     OUTPUT_QOS,
     poll,
@@ -74,11 +84,10 @@ ros2 param list /differential names all parameters, ros2 param describe tells of
 
 class DifferentialNode(Node):
     """
-    A differential in real time.
+    A differential in real time or in lockstep.
 
-    A thread of its own keeps the rate: it sleeps to absolute deadlines of the steady clock,
-    polls the torques, steps and publishes. Parameters, services and diagnostics are served by
-    an executor and meet the loop at a lock, between two ticks.
+    A thread of its own waits for what advances time, steps and publishes. Parameters, services
+    and diagnostics are served by an executor and meet the loop at a lock, between two ticks.
 
     :raises ValueError: for an unknown or impossible parameter; names it.
     """
@@ -90,29 +99,32 @@ class DifferentialNode(Node):
         except ValueError:
             self.destroy_node()
             raise
-        self._lock = threading.Lock()       # held during a tick, and to change what it uses
-        self._running = threading.Event()   # cleared while paused
-        self._running.set()
-        self._stop = threading.Event()
+        self.control = Control()
+        self.on_tick = None   # called with each snapshot that a tick publishes
         self._failure = None
         self._thread = threading.Thread(target=self._run, name='differential loop')
 
-        simulation = self.simulation
+        simulation, lockstep = self.simulation, self._settings.mode == 'lockstep'
+        output_qos = LOCKSTEP_OUTPUT_QOS if lockstep else OUTPUT_QOS
         self._messages = SnapshotMessages(
             simulation.shafts, simulation.inputs, simulation.moments)
-        self._joint_states = self.create_publisher(JointState, '~/joint_states', OUTPUT_QOS)
+        self._joint_states = self.create_publisher(JointState, '~/joint_states', output_qos)
         self._internal_moments = self.create_publisher(
-            JointState, '~/internal_moments', OUTPUT_QOS)
-        self._power_flow = self.create_publisher(Int8, '~/power_flow', OUTPUT_QOS)
+            JointState, '~/internal_moments', output_qos)
+        self._power_flow = self.create_publisher(Int8, '~/power_flow', output_qos)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', OUTPUT_QOS)
+        self._clock_publisher = (self.create_publisher(ClockMessage, '/clock', output_qos)
+                                 if self._settings.publish_clock else None)
+        self._simulated_stamps = lockstep or self._settings.publish_clock
 
         polled = Polled()
-        self._shaft_torques = [
+        self._shaft_torques = [] if lockstep else [
             (shaft, self.create_subscription(Float64, f'~/torque/{shaft}', never_called,
                                              LATEST_QOS, callback_group=polled))
             for shaft in simulation.inputs]
         self._torques = self.create_subscription(
-            JointState, '~/torques', never_called, SHARED_QOS, callback_group=polled)
+            JointState, '~/torques', never_called,
+            LOCKSTEP_INPUT_QOS if lockstep else SHARED_QOS, callback_group=polled)
 
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_service(SetBool, '~/pause', self._pause)
@@ -120,26 +132,46 @@ class DifferentialNode(Node):
         self._parameter_services = WholeRequests(self)
         # the steady clock: a timer of the ROS clock stalls when system time steps back
         self.create_timer(1.0, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._ticks = 0   # since the node is there
         self._diagnosed = 0, time.monotonic_ns()
 
         log = self.get_logger()
         self._missing = Condition('ticks are missed', log)
         self._coarse = Condition('solver steps are coarse', log)
+        self._coarse_before = 0
         self._out_of_range = Condition('ticks are refused', log)
         self._refusing = Condition('torque messages are refused', log)
         self._clamping = Condition('torques are clamped', log)
         self._stale = Condition('torques are too old and count as zero', log)
-        log.info(f'{simulation.variant} at {self._settings.rate:g} Hz, '
+        log.info(f'{simulation.variant} at {self._settings.rate:g} Hz, {self._settings.mode}, '
                  f'torques on {", ".join(simulation.inputs)}')
 
     def start(self):
         """Begin to tick."""
         self._thread.start()
 
+    def reset(self):
+        """Go back to the start; the lock of ``control`` must be held."""
+        self.simulation.reset()
+        self._inputs.forget()
+        self._last_stamp = 0
+
+    def publish_state(self):
+        """Publish the state as it is; the lock of ``control`` must be held."""
+        self._publish(self.simulation.snapshot())
+
+    def discard_torques(self):
+        """Take all waiting messages on ``~/torques`` without a tick; return their number."""
+        return sum(1 for _ in poll(self._torques))
+
+    def is_connected(self):
+        """Return whether somebody gives torques and somebody hears the joint states."""
+        return (self._torques.get_publisher_count() > 0
+                and self._joint_states.get_subscription_count() > 0)
+
     def close(self):
         """Stop ticking and destroy the node; raise what had stopped the loop, if anything."""
-        self._stop.set()
-        self._running.set()
+        self.control.stopping.set()
         if self._thread.is_alive():
             self._thread.join()
         self.destroy_node()
@@ -165,10 +197,17 @@ class DifferentialNode(Node):
             power_flow_deadband=settings.deadband,
             initial_velocity=settings.initial_velocity(model.outputs))
         self._settings = settings
-        self._pacer = Pacer(1e9 / settings.rate)
-        self._inputs = TorqueInputs(self.simulation.inputs, settings.torque_limit,
-                                    settings.torque_timeout * settings.rate)
+        self._follows_clock = self.get_parameter('use_sim_time').value
+        if self._follows_clock and settings.publish_clock:
+            raise ValueError('publish_clock: a node that follows /clock, by use_sim_time, '
+                             'cannot drive it')
+        # another simulator's clock may leap by many ticks, but not by more than a second
+        self._pacer = Pacer(1e9 / settings.rate,
+                            patience=settings.rate if self._follows_clock else 0)
+        self._inputs = TorqueInputs(self.simulation.inputs, settings.torque_limit, 0.0)
+        self._last_stamp = 0
         self._prepared = settings, None
+        self._apply(settings)
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._take_parameters)
 
@@ -189,96 +228,131 @@ class DifferentialNode(Node):
     def _take_parameters(self, parameters):
         """Put what was prepared into force between two ticks."""
         settings, prepared = self._prepared
-        simulation, inputs = self.simulation, self._inputs
-        with self._lock:
-            self._settings = settings
+        with self.control.lock:
             if prepared:
-                simulation.adopt(prepared)
-            simulation.power_flow_deadband = settings.deadband
-            simulation.initial_velocity = settings.initial_velocity(simulation.outputs)
-            inputs.limit = settings.torque_limit
-            inputs.timeout = settings.torque_timeout * settings.rate
+                self.simulation.adopt(prepared)
+            self._apply(settings)
+
+    def _apply(self, settings):
+        """Put the parameters of the node that may change while it runs into force."""
+        self._settings = settings
+        simulation, inputs, pacer = self.simulation, self._inputs, self._pacer
+        simulation.power_flow_deadband = settings.deadband
+        simulation.initial_velocity = settings.initial_velocity(simulation.outputs)
+        inputs.limit = settings.torque_limit
+        # in lockstep time stands still without torques, so none is too old
+        inputs.timeout = 0.0 if settings.mode == 'lockstep' else (
+            settings.torque_timeout * settings.rate)
+        factor = 1.0 if self._follows_clock else settings.real_time_factor
+        period = 1e9 / (settings.rate * factor)
+        if period != pacer.period:
+            pacer.period = period
+            pacer.restart(time.monotonic_ns())
 
     # services
 
     def _reset(self, request, response):
-        with self._lock:
-            self.simulation.reset()
-            self._inputs.forget()
-            self._publish()
+        with self.control.lock:
+            self.reset()
+            self.publish_state()
         response.success = True
         return response
 
     def _pause(self, request, response):
-        with self._lock:
+        with self.control.lock:
             if request.data:
-                self._running.clear()
+                self.control.running.clear()
             else:
-                self._running.set()
+                self.control.running.set()
         response.success = True
         response.message = 'paused' if request.data else 'running'
         return response
 
     def _step(self, request, response):
-        with self._lock:
-            response.success = not self._running.is_set()
+        with self.control.lock:
+            response.success = not self.control.running.is_set()
             if response.success:
+                self._take_torques()
                 self._tick()
                 response.message = f'time {self.simulation.time:.9g} s'
             else:
                 response.message = 'only while paused, see ~/pause'
         return response
 
-    # the loop
+    # the loop; the lock is held in a tick
 
     def _run(self):
-        pacer = self._pacer
+        control, settings = self.control, self._settings
         try:
-            pacer.restart(time.monotonic_ns())
-            while not self._stop.is_set():
-                if not self._running.is_set():
-                    self._running.wait()
-                    pacer.restart(time.monotonic_ns())
-                    continue
-                delay = (pacer.due - time.monotonic_ns()) * 1e-9
-                if delay > 0.5:
-                    self._stop.wait(delay - 0.4)   # not to be late for the stop either
-                    continue
-                if delay > 0.0:
-                    time.sleep(delay)
-                with self._lock:
-                    if self._running.is_set():
-                        pacer.begin(time.monotonic_ns())
-                        self._tick()
+            if settings.realtime_priority:
+                ask_for_priority(settings.realtime_priority, self.get_logger())
+            if settings.mode == 'lockstep':
+                follow_messages(control, self._torques, self.context, self._lockstep_tick)
+            elif self._follows_clock:
+                follow_ros_clock(control, self._pacer, self.get_clock(), self._realtime_tick)
+            else:
+                follow_steady_clock(control, self._pacer, self._realtime_tick)
         except Exception as error:
             if self.context.ok():   # otherwise it is the shutdown that broke a call
                 self._failure = error
                 self.context.try_shutdown()
 
-    def _tick(self):
-        """Take the torques that came, advance one tick and publish; the lock is held."""
-        tick = self.simulation.ticks
+    def _realtime_tick(self):
+        self._take_torques()
+        self._tick()
+
+    def _lockstep_tick(self, message):
+        """Advance one tick with a message and answer it, or refuse both."""
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        if 0 < stamp <= self._last_stamp:
+            self._inputs.refused += 1
+            self._refusing.happened('~/torques: its stamp repeats or goes back in time')
+        elif self._demand(message.name, message.effort, 'torques'):
+            self._last_stamp = stamp or self._last_stamp
+            self._tick()
+
+    def _take_torques(self):
+        """Take the torques that came since the last tick."""
+        if self._settings.mode == 'lockstep':
+            return   # each of its messages brings its own tick
         for shaft, subscription in self._shaft_torques:
             for message, _ in poll(subscription):
-                self._demand((shaft,), (message.data,), tick, f'torque/{shaft}')
+                self._demand((shaft,), (message.data,), f'torque/{shaft}')
         for message, _ in poll(self._torques):
-            self._demand(message.name, message.effort, tick, 'torques')
+            self._demand(message.name, message.effort, 'torques')
+
+    def _tick(self):
+        """Advance one tick and publish."""
         try:
-            self.simulation.advance(self._inputs.in_force(tick))
+            self.simulation.advance(self._inputs.in_force(self.simulation.ticks))
         except ValueError as error:
             self._out_of_range.happened(str(error))
-        self._publish()
+        snapshot = self.simulation.snapshot()
+        self._ticks += 1
+        self._publish(snapshot)
+        if self.on_tick:
+            self.on_tick(snapshot)
 
-    def _demand(self, names, torques, tick, topic):
+    def _demand(self, names, torques, topic):
+        """Take the torques of a message; return whether they were taken."""
         try:
-            if self._inputs.demand(names, torques, tick):
+            if self._inputs.demand(names, torques, self.simulation.ticks):
                 self._clamping.happened(f'~/{topic}: beyond {self._inputs.limit:g} N m')
         except ValueError as error:
             self._refusing.happened(f'~/{topic}: {error}')
+            return False
+        return True
 
-    def _publish(self):
+    def _publish(self, snapshot):
+        if self._simulated_stamps:
+            stamp = divmod(round(self.simulation.ticks * 1e9 / self._settings.rate), 10**9)
+        else:
+            stamp = self.get_clock().now().seconds_nanoseconds()
         messages = self._messages
-        messages.fill(self.simulation.snapshot(), *self.get_clock().now().seconds_nanoseconds())
+        messages.fill(snapshot, *stamp)
+        if self._clock_publisher:
+            self._clock_publisher.publish(
+                ClockMessage(clock=messages.joint_states.header.stamp))
         self._joint_states.publish(messages.joint_states)
         self._internal_moments.publish(messages.internal_moments)
         self._power_flow.publish(messages.power_flow)
@@ -287,16 +361,17 @@ class DifferentialNode(Node):
 
     def _diagnose(self):
         simulation, pacer, inputs = self.simulation, self._pacer, self._inputs
-        ticks, now = pacer.ticks, time.monotonic_ns()
+        ticks, now = self._ticks, time.monotonic_ns()
         (ticks_before, before), self._diagnosed = self._diagnosed, (ticks, now)
-        paused = not self._running.is_set()
+        paused = not self.control.running.is_set()
         stale = inputs.stale(simulation.ticks)
         if pacer.missed > self._missing.count:
             times = pacer.missed - self._missing.count
             self._missing.happened(f'{times} since the last report', times)
-        if simulation.coarse_steps > self._coarse.count:
-            times = simulation.coarse_steps - self._coarse.count
+        if simulation.coarse_steps > self._coarse_before:
+            times = simulation.coarse_steps - self._coarse_before
             self._coarse.happened('their work reached its bound', times)
+        self._coarse_before = simulation.coarse_steps
         if stale:
             self._stale.happened(', '.join(stale))
         loop = (self._missing, self._coarse, self._out_of_range)

@@ -58,3 +58,11 @@ def replacing(path, mode):
     except BaseException:
         os.unlink(unfinished)
         raise
+
+
+def write_csv(columns, path):
+    """Write ``{name: array}`` as CSV, 17 significant digits."""
+    with replacing(path, 'w') as file:
+        file.write(','.join(columns) + '\n')
+        for row in zip(*(values.tolist() for values in columns.values())):
+            file.write(','.join(f'{value:.17g}' for value in row) + '\n')

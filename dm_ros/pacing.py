@@ -22,12 +22,19 @@ class Pacer:
 
     Deadline k is start + k period, so nothing adds up. A tick that comes late runs at once,
     and whole periods that went by without a tick are skipped and counted: there is never a
-    burst. All times are nanoseconds of one steady clock.
+    burst. All times are nanoseconds of one clock.
     """
 
-    def __init__(self, period):
-        """:param period: ns, not necessarily whole."""
+    def __init__(self, period, patience=0):
+        """
+        Begin at time 0.
+
+        :param period: ns, not necessarily whole.
+        :param patience: periods by which a tick may be late without any being skipped; for a
+            clock that advances in leaps of several periods.
+        """
         self.period = period
+        self.patience = patience
         self.ticks = 0
         self.missed = 0
         self._lateness = []
@@ -47,6 +54,8 @@ class Pacer:
         """Begin the tick that is due, at ``now`` or earlier; note its lateness."""
         lateness = now - self.due
         skipped = max(0, int(lateness // self.period))
+        if skipped <= self.patience:
+            skipped = 0
         self._lateness.append(lateness)
         self._count += 1 + skipped
         self.missed += skipped

@@ -301,8 +301,9 @@ class NodeParameters(Parameters):
                        kind=str, read_only=True,
                        choices=('symmetric_ode', 'symmetric_dae',
                                 'lsd_lagged', 'lsd_ode', 'lsd_dae'))
-    mode: str = row('mode', 'realtime', '', 0, 0, 'what advances time: the clock',
-                    kind=str, read_only=True, choices=('realtime',))
+    mode: str = row('mode', 'realtime', '', 0, 0,
+                    'what advances time: the clock, or each message on ~/torques by one tick',
+                    kind=str, read_only=True, choices=('realtime', 'lockstep'))
     rate: float = row('rate', 200.0, 'Hz', 0.1, 1e4, 'ticks in a second', read_only=True)
     substeps: int = row('substeps', 1, '1', 1, 1000, 'solver steps in a tick', kind=int)
     torque_timeout: float = row('torque_timeout', 0.5, 's', 0.0, 1e6,
@@ -311,6 +312,14 @@ class NodeParameters(Parameters):
                               'larger demands are clamped to this and counted')
     deadband: float = row('power_flow_deadband', 0.0, 'W', 0.0, 1e9,
                           'difference of power within which the power-flow index stays')
+    real_time_factor: float = row('real_time_factor', 1.0, '1', 0.0, 1e3,
+                                  'speed of simulated time against the steady clock',
+                                  above_low=True)
+    publish_clock: bool = row('publish_clock', False, '', 0, 0,
+                              'drive /clock with simulated time', kind=bool, read_only=True)
+    realtime_priority: int = row('realtime_priority', 0, '1', 0, 99,
+                                 'SCHED_FIFO priority of the loop, 0 for none',
+                                 kind=int, read_only=True)
     initial_left: float = initial_velocity('left')
     initial_right: float = initial_velocity('right')
     initial_front: float = initial_velocity('front')

@@ -23,7 +23,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Int8
 
 from dm_ros.messages import never_called, poll, Polled
-from dm_ros.output_file import column_names, replacing
+from dm_ros.output_file import column_names
 from dm_ros.simulation import Simulation
 
 DEEP_QOS = QoSProfile(depth=5000)
@@ -116,14 +116,6 @@ class Recorder:
                 sec, nanosec = stamp(joints)
                 yield (sec + nanosec * 1e-9, *joints.velocity, *joints.position,
                        *(joints.effort[i] for i in inputs), *moments, self._flows[flow][1])
-
-
-def write_csv(columns, path):
-    """Write columns as CSV, 17 significant digits."""
-    with replacing(path, 'w') as file:
-        file.write(','.join(columns) + '\n')
-        for row in zip(*(values.tolist() for values in columns.values())):
-            file.write(','.join(f'{value:.17g}' for value in row) + '\n')
 
 
 def stamp(message):

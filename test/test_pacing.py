@@ -61,3 +61,16 @@ def test_lateness_is_that_of_the_ticks_since_the_last_question():
         pacer.begin(pacer.due + late)
     assert pacer.take_lateness() == [10, 20, 30]
     assert pacer.take_lateness() == []
+
+
+def test_a_patient_pacer_catches_up_a_leap_of_the_clock_but_not_a_jump():
+    pacer = Pacer(1000, patience=10)
+    pacer.restart(0)
+    ticks = 0
+    while pacer.due <= 9000:
+        pacer.begin(9000)
+        ticks += 1
+    assert (ticks, pacer.missed) == (9, 0)
+    pacer.begin(3_600_000_500)
+    assert pacer.missed == 3_599_990
+    assert pacer.due == 3_600_001_000

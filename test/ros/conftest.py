@@ -22,19 +22,19 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from dm_ros.domain import free_domain
+from dm_ros.domain import own_domain
 from dm_ros.node import DifferentialNode
 
 
 class Ros:
     """A user of ROS in its own context: one node, one executor, all waits end."""
 
-    def __init__(self, monkeypatch):
-        self.domain = free_domain()
+    def __init__(self, monkeypatch, domain):
+        self.domain = domain
         monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        monkeypatch.setenv('ROS_DOMAIN_ID', str(self.domain))
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
         self.context = rclpy.Context()
-        rclpy.init(context=self.context, domain_id=self.domain)
+        rclpy.init(context=self.context, domain_id=domain)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.node = rclpy.create_node('user', context=self.context)
         self.executor.add_node(self.node)
@@ -90,6 +90,7 @@ class Ros:
 
 @pytest.fixture
 def ros(monkeypatch):
-    user = Ros(monkeypatch)
-    yield user
-    user.close()
+    with own_domain() as domain:
+        user = Ros(monkeypatch, domain)
+        yield user
+        user.close()

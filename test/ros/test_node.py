@@ -174,7 +174,7 @@ def test_every_parameter_has_its_default_a_description_a_unit_and_a_range(
         entry = rows[name]
         assert d.description.startswith(entry.description)
         assert entry.unit in ('', '1') or entry.unit in d.description
-        assert d.read_only == (name in ('variant', 'mode', 'rate'))
+        assert d.read_only == entry.read_only
         if entry.kind is float:
             assert value.double_value == defaults[name]
             assert (d.floating_point_range[0].from_value, d.floating_point_range[0].to_value) \

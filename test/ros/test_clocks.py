@@ -1,0 +1,125 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whose time it is: the steady clock faster or slower, and another simulator's /clock."""
+
+from builtin_interfaces.msg import Time
+import pytest
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool, Trigger
+
+from dm_ros.node import DifferentialNode
+
+
+class Simulator:
+    """Another simulator, whose clock the test sets."""
+
+    def __init__(self, ros):
+        self.publisher = ros.node.create_publisher(Clock, '/clock', 10)
+        self.ros = ros
+
+    def show(self, nanoseconds, node, ticks):
+        """Show a time until the node has made so many ticks."""
+        message = Clock(clock=Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9))
+
+        def done():
+            self.publisher.publish(message)
+            # the loop has seen it: its next tick is due within a period from then
+            seen = 0 < node._pacer.due - nanoseconds <= node._pacer.period
+            return seen and node.simulation.ticks == ticks
+        self.ros.until(done)
+
+
+@pytest.fixture
+def follower(ros):
+    node = ros.differential(rate=100.0, use_sim_time=True)
+    return node, Simulator(ros)
+
+
+def test_it_follows_another_clock_tick_by_tick_also_in_leaps(follower):
+    node, simulator = follower
+    simulator.show(10**9, node, 0)
+    simulator.show(10**9 + 10_000_000, node, 1)
+    simulator.show(10**9 + 15_000_000, node, 1)
+    simulator.show(10**9 + 100_000_000, node, 10)
+    assert node.simulation.time == pytest.approx(0.1)
+
+
+def test_a_clock_that_stands_still_pauses_it(ros, follower):
+    node, simulator = follower
+    simulator.show(10**9, node, 0)
+    simulator.show(10**9 + 50_000_000, node, 5)
+    before = node.get_clock().now().nanoseconds
+    diagnosed = node._diagnosed
+    ros.until(lambda: node._diagnosed != diagnosed)   # a second of real time
+    assert (node.simulation.ticks, node.get_clock().now().nanoseconds) == (5, before)
+
+
+def test_a_clock_that_jumps_back_makes_no_negative_step_and_goes_on(follower):
+    node, simulator = follower
+    simulator.show(50 * 10**9, node, 0)
+    simulator.show(50 * 10**9 + 30_000_000, node, 3)
+    simulator.show(2 * 10**9, node, 3)
+    simulator.show(2 * 10**9 + 20_000_000, node, 5)
+    assert node.simulation.time == pytest.approx(0.05)
+
+
+def test_a_clock_that_jumps_an_hour_ahead_is_not_caught_up_with(follower):
+    node, simulator = follower
+    simulator.show(10**9, node, 0)
+    simulator.show(3601 * 10**9 + 5_000_000, node, 1)
+    assert node._pacer.missed == 359_999
+    simulator.show(3601 * 10**9 + 20_000_000, node, 3)
+
+
+def test_stamps_are_those_of_the_followed_clock(ros, follower):
+    node, simulator = follower
+    joints = ros.listen(JointState, '/differential/joint_states')
+    simulator.show(7 * 10**9, node, 0)
+    simulator.show(7 * 10**9 + 20_000_000, node, 2)
+    ros.until(lambda: len(joints) == 2)
+    assert joints[-1].header.stamp == Time(sec=7, nanosec=20_000_000)
+
+
+def test_it_cannot_follow_and_drive_the_clock_at_once(ros):
+    with pytest.raises(ValueError, match='publish_clock'):
+        ros.differential(use_sim_time=True, publish_clock=True)
+
+
+def test_a_driven_clock_goes_with_the_ticks_in_real_time_and_paused(ros):
+    node = ros.differential(rate=200.0, publish_clock=True)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    clock = ros.listen(Clock, '/clock')
+    ros.until(lambda: len(clock) > 10)
+    ros.call(SetBool, '/differential/pause', data=True)
+    ticks = node.simulation.ticks
+    assert ros.call(Trigger, '/differential/step').success
+    ros.until(lambda: clock[-1].clock.nanosec + clock[-1].clock.sec * 10**9
+              == (ticks + 1) * 5_000_000)
+    ros.until(lambda: joints[-1].header.stamp == clock[-1].clock)
+    times = [m.clock.sec * 10**9 + m.clock.nanosec for m in clock]
+    assert {b - a for a, b in zip(times, times[1:])} == {5_000_000}
+
+
+@pytest.mark.parametrize('factor', [0.1, 5.0])
+def test_the_real_time_factor_is_the_speed_of_simulated_time(ros, factor):
+    fast = ros.differential(rate=100.0, real_time_factor=factor)
+    plain = ros.differential(rate=100.0)
+    ros.until(lambda: plain.simulation.ticks >= 100 or fast.simulation.ticks >= 100)
+    # two in one run on one machine: their ratio, whatever its load; missed ticks count as made
+    made = [n.simulation.ticks + n._pacer.missed for n in (fast, plain)]
+    assert made[0] / made[1] == pytest.approx(factor, rel=0.25)
+    assert isinstance(fast, DifferentialNode)

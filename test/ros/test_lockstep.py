@@ -1,0 +1,260 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lockstep: a message is a tick and an answer, to the last bit."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+import pytest
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Int8
+from std_srvs.srv import SetBool, Trigger
+
+from dm_ros import Simulation
+from dm_ros.testing import LockstepDifferential
+
+
+def torques(*efforts, names=('carrier', 'front', 'rear'), stamp=0):
+    message = JointState(name=list(names), effort=[float(effort) for effort in efforts])
+    message.header.stamp = Time(sec=stamp // 10**9, nanosec=stamp % 10**9)
+    return message
+
+
+def load(n):
+    """Return torques of a deterministic load that locks, slips and reverses."""
+    return (300.0 - n % 400, -100.0 + n % 37, -150.0 + n % 91)
+
+
+class Controller(Node):
+    """Answers each joint state with the torques of the next tick."""
+
+    def __init__(self, context, limit=None):
+        super().__init__('controller', context=context)
+        self.heard, self.limit = 0, limit
+        self.torques = self.create_publisher(JointState, '/differential/torques', 100)
+        self.states = self.create_subscription(
+            JointState, '/differential/joint_states', self.answer, 100)
+
+    def answer(self, message):
+        self.heard += 1
+        if self.limit is None or self.heard <= self.limit:
+            T_0, T_1, T_2 = load(self.heard)
+            self.torques.publish(torques(T_0 - message.velocity[0], T_1, T_2))
+
+
+def test_each_message_is_one_tick_with_one_answer_of_each_kind(ros):
+    node = ros.differential('lsd_ode', mode='lockstep', rate=500.0)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    moments = ros.listen(JointState, '/differential/internal_moments')
+    flow = ros.listen(Int8, '/differential/power_flow')
+    publisher = ros.publisher(JointState, '/differential/torques')
+    simulation = Simulation('lsd_ode', 1 / 500.0)
+    for n in range(1, 101):
+        publisher.publish(torques(*load(n)))
+        ros.until(lambda n=n: len(joints) == len(moments) == len(flow) == n)
+        snapshot = simulation.step(load(n))
+        assert tuple(joints[-1].velocity) == snapshot.velocity
+        assert tuple(joints[-1].position) == snapshot.position
+        assert tuple(moments[-1].effort) == snapshot.moment
+        assert flow[-1].data == snapshot.power_flow
+        assert joints[-1].header.stamp == moments[-1].header.stamp
+        assert joints[-1].header.stamp.nanosec == n * 2_000_000
+    assert node.simulation.ticks == 100
+
+
+def test_a_burst_loses_nothing(ros):
+    node = ros.differential('symmetric_ode', mode='lockstep')
+    joints = ros.listen(JointState, '/differential/joint_states', depth=5000)
+    publisher = ros.node.create_publisher(JointState, '/differential/torques', 5000)
+    ros.until(lambda: publisher.get_subscription_count() > 0)
+    for n in range(2000):
+        publisher.publish(torques(n, names=['pinion']))
+    ros.until(lambda: len(joints) == 2000)
+    assert [m.effort[3] for m in joints] == [float(n) for n in range(2000)]
+    assert node.simulation.ticks == 2000
+
+
+def test_missing_shafts_keep_their_torque_however_long(ros):
+    ros.differential('lsd_ode', mode='lockstep', torque_timeout=0.01)
+    joints = ros.listen(JointState, '/differential/joint_states')
+    publisher = ros.publisher(JointState, '/differential/torques')
+    publisher.publish(torques(1, 2, 3))
+    for _ in range(50):
+        publisher.publish(torques(5, names=['front']))
+    publisher.publish(torques(names=[]))
+    ros.until(lambda: len(joints) == 52)
+    assert list(joints[-1].effort) == [1.0, 5.0, 3.0, 0.0]
+
+
+def test_a_stamp_that_repeats_or_goes_back_is_refused_and_a_zero_stamp_is_none(ros):
+    node = ros.differential('lsd_ode', mode='lockstep')
+    joints = ros.listen(JointState, '/differential/joint_states')
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    publisher = ros.publisher(JointState, '/differential/torques')
+    for effort, stamp in ((1, 0), (2, 100), (3, 100), (4, 50), (5, 0), (6, 101)):
+        publisher.publish(torques(effort, names=['carrier'], stamp=stamp))
+    ros.until(lambda: len(joints) == 4)
+    assert [m.effort[0] for m in joints] == [1.0, 2.0, 5.0, 6.0]
+    ros.until(lambda: diagnostics and any(
+        pair.key == 'refused messages' and pair.value == '2'
+        for status in diagnostics[-1].status for pair in status.values))
+    assert node.simulation.ticks == 4
+
+
+def test_a_refused_message_is_no_tick(ros):
+    node = ros.differential('lsd_ode', mode='lockstep')
+    joints = ros.listen(JointState, '/differential/joint_states')
+    publisher = ros.publisher(JointState, '/differential/torques')
+    publisher.publish(torques(1, float('nan'), names=['front', 'rear']))
+    publisher.publish(torques(7, names=['front']))
+    ros.until(lambda: joints)
+    assert list(joints[0].effort) == [0.0, 7.0, 0.0, 0.0]
+    assert node.simulation.ticks == 1
+
+
+def test_paused_messages_wait_and_a_step_is_one_tick(ros):
+    node = ros.differential('lsd_ode', mode='lockstep')
+    joints = ros.listen(JointState, '/differential/joint_states')
+    publisher = ros.publisher(JointState, '/differential/torques')
+    publisher.publish(torques(1, 2, 3))
+    ros.until(lambda: len(joints) == 1)
+    ros.call(SetBool, '/differential/pause', data=True)
+    publisher.publish(torques(4, 5, 6))
+    assert ros.call(Trigger, '/differential/step').success
+    ros.until(lambda: len(joints) == 2)
+    assert list(joints[1].effort) == [1.0, 2.0, 3.0, 0.0]
+    ros.call(SetBool, '/differential/pause', data=False)
+    ros.until(lambda: len(joints) == 3)
+    assert list(joints[2].effort) == [4.0, 5.0, 6.0, 0.0]
+    assert node.simulation.ticks == 3
+
+
+def test_after_a_reset_a_run_repeats_bit_for_bit():
+    with LockstepDifferential('lsd_lagged', 1000.0) as vehicle:
+        controller = vehicle.attach(Controller(vehicle.context))
+        first = vehicle.run(seconds=0.5)
+        vehicle.reset()
+        controller.heard = 0
+        again = vehicle.run(seconds=0.5)
+    for name, values in first.columns.items():
+        assert (values == again.columns[name]).all(), name
+
+
+@pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])
+def test_the_lockstep_run_is_the_direct_run_to_the_last_bit_under_load(variant):
+    def law(heard, snapshot):
+        T_0, T_1, T_2 = load(heard)
+        return dict(zip(('carrier', 'front', 'rear'), (T_0 - snapshot.velocity[0], T_1, T_2)))
+
+    busy = threading.Event()
+    burner = threading.Thread(target=lambda: [None for _ in iter(busy.is_set, True)])
+    burner.start()
+    try:
+        with LockstepDifferential(variant, 1000.0) as vehicle:
+            names = vehicle.simulation.inputs
+            controller = Controller(vehicle.context)
+            if variant == 'symmetric_ode':
+                controller.destroy_subscription(controller.states)
+
+                def answer(message):
+                    controller.heard += 1
+                    controller.torques.publish(
+                        torques(*load(controller.heard), names=names))
+                controller.states = controller.create_subscription(
+                    JointState, '/differential/joint_states', answer, 100)
+            vehicle.attach(controller)
+            record = vehicle.run(seconds=1.0)
+    finally:
+        busy.set()
+        burner.join()
+    simulation = Simulation(variant, 1e-3)
+    snapshot = simulation.snapshot()
+    for n in range(1000):
+        T = load(n + 1) if variant == 'symmetric_ode' else tuple(law(n + 1, snapshot).values())
+        snapshot = simulation.step(T)
+        assert tuple(record.columns[f'velocity.{shaft}'][n] for shaft in simulation.shafts) \
+            == snapshot.velocity
+
+
+def test_a_run_ends_to_the_tick_and_says_so_when_nobody_answers(monkeypatch):
+    monkeypatch.setattr('dm_ros.testing.PATIENCE', 1.0)
+    with LockstepDifferential('lsd_ode', 1000.0) as vehicle:
+        with pytest.raises(TimeoutError, match='nobody publishes'):
+            vehicle.run(seconds=1.0)
+        vehicle.attach(Controller(vehicle.context, limit=7))
+        with pytest.raises(TimeoutError, match='no tick for 1 s after 7 ticks'):
+            vehicle.run(seconds=1.0)
+        assert vehicle.simulation.ticks == 7
+
+
+def test_a_run_ends_at_its_condition_and_goes_on():
+    with LockstepDifferential('lsd_ode', 1000.0) as vehicle:
+        vehicle.attach(Controller(vehicle.context))
+        record = vehicle.run(seconds=9.0, until=lambda snapshot: snapshot.time >= 0.123)
+        assert len(record) == vehicle.simulation.ticks == 123
+        assert len(vehicle.run(seconds=0.2)) == 200
+        assert len(vehicle.record) == 323
+        whole = vehicle.record
+    with LockstepDifferential('lsd_ode', 1000.0) as vehicle:
+        vehicle.attach(Controller(vehicle.context))
+        assert (vehicle.run(seconds=0.323).position['rear'] == whole.position['rear']).all()
+
+
+def test_a_stopped_and_continued_process_misses_no_tick(ros):
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'dm_ros.node', '--ros-args', '-p', 'mode:=lockstep', '-p',
+         'variant:=lsd_ode', '-p', 'rate:=1000.0'], env=os.environ)
+    joints = ros.listen(JointState, '/differential/joint_states', depth=5000)
+    publisher = ros.node.create_publisher(JointState, '/differential/torques', 5000)
+    ros.until(lambda: publisher.get_subscription_count() > 0)
+    for n in range(1, 401):
+        if n == 200:
+            process.send_signal(signal.SIGSTOP)
+        publisher.publish(torques(*load(n)))
+        if n == 300:
+            process.send_signal(signal.SIGCONT)
+    ros.until(lambda: len(joints) == 400)
+    process.terminate()
+    assert process.wait(20) == 0
+    simulation = Simulation('lsd_ode', 1e-3)
+    for n, message in enumerate(joints, start=1):
+        assert tuple(message.velocity) == simulation.step(load(n)).velocity
+
+
+def test_the_clock_goes_with_the_ticks(ros):
+    ros.differential('lsd_ode', mode='lockstep', rate=100.0, publish_clock=True)
+    clock = ros.listen(Clock, '/clock')
+    publisher = ros.publisher(JointState, '/differential/torques')
+    for _ in range(5):
+        publisher.publish(torques(1, 2, 3))
+    ros.until(lambda: len(clock) == 5)
+    assert [m.clock.nanosec for m in clock] == [n * 10_000_000 for n in range(1, 6)]
+
+
+def test_shaft_topics_do_not_exist_in_lockstep(ros):
+    ros.differential('lsd_ode', mode='lockstep')
+    publisher = ros.node.create_publisher(Float64, '/differential/torque/front', 10)
+    end = time.monotonic() + 0.5
+    ros.until(lambda: time.monotonic() > end)
+    assert publisher.get_subscription_count() == 0

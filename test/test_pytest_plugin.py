@@ -1,0 +1,88 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the pytest plugin gives to the tests of a controller."""
+
+import csv
+
+import pytest
+
+from dm_ros import Simulation
+from dm_ros.testing import DirectDifferential
+
+pytest_plugins = ['pytester']
+
+TORQUES = (300.0, -100.0, -150.0)
+
+
+def test_a_direct_run_is_the_simulation_with_the_law_between_the_ticks(direct_differential):
+    vehicle = direct_differential('lsd_ode', rate=500.0)
+    record = vehicle.run(lambda snapshot: (300.0 - snapshot.velocity[0], -100.0, -140.0),
+                         seconds=0.2)
+    simulation = Simulation('lsd_ode', 1 / 500.0)
+    snapshot = simulation.snapshot()
+    for n in range(100):
+        snapshot = simulation.step((300.0 - snapshot.velocity[0], -100.0, -140.0))
+        assert record.velocity['rear'][n] == snapshot.velocity[2]
+        assert record.moment['rear_clutch'][n] == snapshot.moment[3]
+    assert len(record) == 100
+    assert record.time[-1] == 0.2
+
+
+def test_a_run_ends_when_its_condition_holds_or_its_time_is_over(direct_differential):
+    vehicle = direct_differential('symmetric_ode', rate=100.0)
+    record = vehicle.run(lambda snapshot: (10.0, 0.0, 0.0), seconds=10.0,
+                         until=lambda snapshot: snapshot.velocity[3] > 20.0)
+    assert record.velocity['pinion'][-1] > 20.0 >= record.velocity['pinion'][-2]
+    assert len(vehicle.run(lambda snapshot: (0.0, 0.0, 0.0), seconds=0.5)) == 50
+    assert len(vehicle.record) == len(record) + 50
+    with pytest.raises(ValueError, match='seconds, until'):
+        vehicle.run(lambda snapshot: (0.0, 0.0, 0.0))
+
+
+def test_slip_is_the_difference_of_the_output_shafts():
+    record = DirectDifferential('symmetric_dae').run(lambda _: (1.0, -3.0, 1.0), seconds=0.1)
+    assert record.slip[-1] == record.velocity['left'][-1] - record.velocity['right'][-1] != 0.0
+
+
+def test_a_failing_test_leaves_its_record_and_a_passing_one_does_not(pytester):
+    pytester.makepyfile(test_it="""
+        import pytest
+
+        @pytest.mark.parametrize('limit', [1e9, 0.0])
+        def test_speed(direct_differential, limit):
+            vehicle = direct_differential('lsd_ode')
+            record = vehicle.run(lambda snapshot: (300.0, -100.0, -150.0), seconds=0.05)
+            assert record.velocity['carrier'].max() < limit
+    """)
+    result = pytester.runpytest_subprocess('--differential-records', 'left')
+    result.assert_outcomes(passed=1, failed=1)
+    left = sorted((pytester.path / 'left').iterdir())
+    assert [path.suffix for path in left] == ['.csv', '.png']
+    with open(left[0], newline='') as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 50
+    assert float(rows[-1]['torque.rear']) == -150.0
+    assert left[1].read_bytes().startswith(b'\x89PNG')
+
+
+def test_the_plugin_loads_neither_ros_nor_matplotlib_where_no_test_wants_it(pytester):
+    pytester.makepyfile(test_it="""
+        import sys
+
+        def test_nothing():
+            assert not {'rclpy', 'matplotlib'} & set(sys.modules)
+    """)
+    pytester.runpytest_subprocess().assert_outcomes(passed=1)
