@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test test-long lint bench colcon test-jazzy-versions clean
+.PHONY: help setup run test test-long lint bench bench-loop soak colcon test-jazzy-versions clean
 
 PYTHON = python3
 VARIANT = symmetric_ode
@@ -64,6 +64,12 @@ test-long: setup  ## run the long tests: random parameters by the 100,000, a day
 
 bench: .venv-bench/done  ## measure what a step costs, beside other tools, and how exact it is: BENCH_ARGS
 	env -u PYTHONPATH .venv-bench/bin/python bench/step.py $(BENCH_ARGS)
+
+bench-loop: setup  ## measure how the node holds its rate, beside a loop in C: BENCH_ARGS
+	.venv/bin/python bench/loop.py $(BENCH_ARGS)
+
+soak: setup  ## run the node for an hour, or DURATION s, and look at memory and rate
+	.venv/bin/python bench/soak.py $(if $(filter command line,$(origin DURATION)),--duration $(DURATION))
 
 lint: .venv-lint/done  ## check the style
 	.venv-lint/bin/ruff check

@@ -16,6 +16,7 @@
 """The node ``differential``: the simulation at a fixed rate, torques in, speeds out."""
 
 import argparse
+import gc
 import sys
 import threading
 import time
@@ -424,6 +425,8 @@ def main(args=None):
         node = DifferentialNode()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
+        gc.collect()
+        gc.freeze()   # a full collection takes tens of ms; this leaves it little to look at
         node.start()
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):

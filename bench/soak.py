@@ -1,0 +1,106 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The soak: does the node stay what it is, hour after hour, with all its topics alive.
+
+Starts the node and a load as processes, listens to all topics, sets a parameter now and then,
+and looks at the node's memory, at /dev/shm and at the rate it holds. Run ``make soak``, shorter
+by ``make soak DURATION=600``. Exits with 1 where memory, /dev/shm or the rate did not hold.
+"""
+
+import argparse
+import os
+from pathlib import Path
+import sys
+import time
+
+import numpy as np
+
+from dm_ros.demo import process, wait
+from dm_ros.domain import own_domain
+from dm_ros.recorder import Recorder
+
+LOOK = 5.0        # s between two looks
+MEMORY = 1024     # kB that the node may grow by after the warm-up
+
+
+def memory_of(pid):
+    """Return the resident memory of a process in kB."""
+    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
+        if line.startswith('VmRSS'):
+            return int(line.split()[1])
+    raise ProcessLookupError(pid)
+
+
+def shared_memory():
+    """Return the bytes that files in /dev/shm take."""
+    return sum(path.stat().st_size for path in Path('/dev/shm').iterdir() if path.is_file())
+
+
+def soak(arguments):
+    """Return one row a look: s, kB of the node, bytes in /dev/shm, ticks heard since the last."""
+    rows = []
+    parameters = ['--ros-args', '-p', f'variant:={arguments.variant}', '-p',
+                  f'rate:={arguments.rate!r}']
+    with Recorder('/differential', arguments.variant) as recorder, \
+            process('node', *parameters) as node, \
+            process('play_torques', '--variant', arguments.variant) as player:
+        wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft', node, player)
+        start = looked = time.monotonic()
+        heard = 0
+        while (now := time.monotonic()) - start < arguments.duration:
+            heard += recorder.poll()
+            if now - looked > LOOK:
+                rows.append((now - start, memory_of(node.pid), shared_memory(),
+                             heard / (now - looked)))
+                looked, heard = now, 0
+                recorder.clear()
+            time.sleep(0.02)
+    return np.array(rows)
+
+
+def main():
+    parser = argparse.ArgumentParser('soak', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--duration', type=float, default=3600.0, help='s')
+    parser.add_argument('--warm-up', type=float, default=60.0, help='s')
+    parser.add_argument('--rate', type=float, default=500.0, help='Hz')
+    parser.add_argument('--variant', default='lsd_ode')
+    arguments = parser.parse_args()
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    with own_domain() as domain:
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
+        rows = soak(arguments)
+    warm = rows[rows[:, 0] > min(arguments.warm_up, arguments.duration / 2)]
+    memory, shared, rate = warm[:, 1], warm[:, 2], warm[:, 3]
+    part = max(1, len(warm) // 4)
+    grown = np.median(memory[-part:]) - np.median(memory[:part])
+    rates = np.median(rate[:part]), np.median(rate[-part:])
+    held = {
+        f'memory of the node: {memory[0]:.0f} kB after the warm-up, {memory[-1]:.0f} kB at the '
+        f'end, first to last quarter {grown:+.0f} kB': grown <= MEMORY,
+        f'/dev/shm: {shared[0] / 1024:.0f} kB after the warm-up, {shared[-1] / 1024:.0f} kB at '
+        'the end': shared[-1] <= shared[0],
+        f'rate heard: {rates[0]:.2f} Hz in the first quarter, {rates[1]:.2f} Hz in the last, '
+        f'lowest {rate.min():.2f} Hz in {LOOK:g} s': rates[1] >= 0.999 * rates[0]}
+    print(f'{rows[-1, 0]:.0f} s of {arguments.variant} at {arguments.rate:g} Hz')
+    for line, holds in held.items():
+        print(f'{"holds" if holds else "FAILS"}  {line}')
+    return 0 if all(held.values()) else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())
