@@ -19,7 +19,7 @@ PACKAGING := Makefile package.xml setup.cfg setup.py
 # pip writes console scripts to bin/ whatever setup.cfg says, if it builds by PEP 517.
 PIP_INSTALL := bin/pip install --quiet --use-pep517
 
-# What .venv-lint, .venv-bench, .venv-colcon and .venv-jazzy hold.
+# What .venv-lint, .venv-bench and .venv-jazzy hold, and what colcon adds to .venv.
 lint := ruff==0.17.6
 bench := --editable . mujoco==4.0.0 control==0.10.2
 colcon := colcon-common-extensions ros-jazzy-ament-package 'setuptools<80' wheel
@@ -74,12 +74,17 @@ soak: setup  ## run the node for an hour, or DURATION s, and look at memory and 
 lint: .venv-lint/done  ## check the style
 	.venv-lint/bin/ruff check
 
-colcon: .venv-colcon/done  ## build the package with colcon and check what it installs
+.venv/colcon: .venv/$(ROS)
+	test $(ROS) = ros || .venv/$(PIP_INSTALL) $(colcon)
+	touch $@
+
+colcon: .venv/colcon  ## build the package with colcon, check what it installs, start its node
 	rm -rf build install log
-	env -u PYTHONPATH PATH="$(CURDIR)/.venv-colcon/bin:$$PATH" colcon build
-	test -x install/dm_ros/lib/dm_ros/differential
+	PATH="$(CURDIR)/.venv/bin:$$PATH" colcon build
 	test -f install/dm_ros/share/dm_ros/package.xml
-	ls install/dm_ros/share/dm_ros/config/*.yaml
+	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST timeout --preserve-status -s INT 5 \
+	  install/dm_ros/lib/dm_ros/differential --ros-args -p variant:=lsd_ode -p rate:=500.0 \
+	  --params-file install/dm_ros/share/dm_ros/config/lsd.yaml
 
 test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's numpy and scipy
 	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest --ignore=test/ros $(PYTEST_ARGS)
