@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test test-long lint bench bench-loop soak colcon test-jazzy-versions clean
+.PHONY: help setup run test test-long lint bench bench-loop soak compare colcon test-jazzy-versions clean
 
 PYTHON = python3
 VARIANT = symmetric_ode
@@ -9,6 +9,8 @@ RATE = 200
 OUT = run
 PYTEST_ARGS =
 BENCH_ARGS =
+COMPARE_ARGS =
+EXTRAS = ros,test
 
 # The interpreter beneath any virtual environment, and where rclpy comes from:
 # `ros`, a sourced ROS 2 in which it imports, or `pypi`, the wheels.
@@ -23,7 +25,7 @@ PIP_INSTALL := bin/pip install --quiet --use-pep517
 lint := ruff==0.17.6
 bench := --editable . mujoco==4.0.0 control==0.10.2
 colcon := colcon-common-extensions ros-jazzy-ament-package 'setuptools<80' wheel
-jazzy := --editable '.[test]' numpy==1.26.4 scipy==1.11.4
+jazzy := --editable '.[test,physics]' numpy==1.26.4 scipy==1.11.4
 
 help:  ## print this
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 22
@@ -34,7 +36,7 @@ setup: .venv/$(ROS)  ## make .venv, with a sourced ROS 2 or else with its wheels
 .venv/pypi: $(PACKAGING)
 	rm -rf .venv
 	$(BASE) -m venv .venv
-	.venv/$(PIP_INSTALL) --editable '.[ros,test]'
+	.venv/$(PIP_INSTALL) --editable '.[$(EXTRAS)]'
 	touch $@
 
 # Needs no network when rosdep has installed the dependencies; numpy stays the one of ROS.
@@ -58,6 +60,9 @@ run: setup  ## run the demo: VARIANT, DURATION in s, RATE in Hz, OUT a folder
 test: setup  ## run the tests: PYTEST_ARGS
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \
 	  .venv/bin/python -m pytest $(PYTEST_ARGS)
+
+compare: setup  ## compare all variants as the paper does, on a page in comparison/: COMPARE_ARGS
+	.venv/bin/compare_variants $(COMPARE_ARGS)
 
 test-long: setup  ## run the long tests: random parameters by the 100,000, a day of simulated time
 	.venv/bin/python -m pytest -s test/long $(PYTEST_ARGS)
@@ -90,4 +95,4 @@ test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's n
 	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest --ignore=test/ros $(PYTEST_ARGS)
 
 clean:  ## remove all that the other targets make
-	rm -rf .venv .venv-* build install log run *.egg-info .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .venv-* build install log run comparison *.egg-info .hypothesis .pytest_cache .ruff_cache

@@ -29,7 +29,7 @@ setup(
     maintainer=PACKAGE.findtext('maintainer'),
     maintainer_email=PACKAGE.find('maintainer').get('email'),
     license=PACKAGE.findtext('license'),
-    packages=[NAME],
+    packages=[NAME, f'{NAME}.comparison'],
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -39,12 +39,15 @@ setup(
     python_requires='>=3.11',
     install_requires=['numpy>=1.26', 'scipy>=1.11', 'PyYAML', 'tqdm'],
     extras_require={
+        'physics': ['mujoco>=4'],
         'plot': [MATPLOTLIB],
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'test': ['hypothesis', 'pytest', MATPLOTLIB],
     },
     entry_points={
         'console_scripts': [
+            'bias = dm_ros.bias:main',
+            'compare_variants = dm_ros.compare_variants:main',
             'demo = dm_ros.demo:main',
             'differential = dm_ros.node:main',
             'play_torques = dm_ros.play_torques:main',

@@ -1,0 +1,280 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tool ``compare_variants``: its page, the paper's claims on short runs, and bad input."""
+
+from base64 import b64encode
+from html.parser import HTMLParser
+import os
+
+import numpy as np
+import pytest
+
+from dm_ros import compare_variants, VARIANTS
+from dm_ros.comparison import measures as measures
+from dm_ros.comparison import page as comparison_page
+from dm_ros.comparison.claims import SILENT
+from dm_ros.comparison.figures import FIGURES
+from dm_ros.comparison.reference import exact_self_locking, exact_symmetric
+from dm_ros.comparison.runs import Load, MECHANISMS, RATES, run, ticks_of, variants_of
+from dm_ros.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.self_locking import balance, SelfLockingDae, SelfLockingOde
+from dm_ros.symmetric import SymmetricDae
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Run each test in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(scope='module')
+def runs():
+    """Return the runs of both mechanisms over a short piece of the built-in loads."""
+    class ToSlipAndLock(Load):
+        """The piece of Figure 7 in which the clutches let go, the direction changes, both lock."""
+
+        def held(self, rate):
+            start = round(1.2 * rate)
+            return Load(self.mechanism, 1.2 + self.seconds).held(rate)[start:]
+
+    return {'symmetric': run('symmetric', Load('symmetric', 0.6), {}, lambda n=1: None),
+            'lsd': run('lsd', ToSlipAndLock('lsd', 1.1), {}, lambda n=1: None)}
+
+
+class Page(HTMLParser):
+    """What a page refers to and which elements are left open."""
+
+    VOID = {'meta', 'img', 'link', 'br'}
+
+    def __init__(self, text):
+        super().__init__()
+        self.images, self.links, self.open, self.text = {}, [], [], ''
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        if tag not in self.VOID:
+            self.open.append(tag)
+        if tag == 'img':
+            self.images[attributes['alt']] = attributes['src']
+        if tag == 'a':
+            self.links.append(attributes['href'])
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def compare(*arguments):
+    return compare_variants.main(['--duration', '0.1', *arguments])
+
+
+def page_in(path):
+    with open(os.path.join(path, 'index.html'), encoding='utf-8') as file:
+        return file.read()
+
+
+def test_page_is_complete_and_shows_every_picture_that_lies_beside_it(capsys):
+    assert compare() == 0
+    assert 'index.html' in capsys.readouterr().out
+    assert sorted(os.listdir('comparison')) == sorted([*FIGURES, 'index.html'])
+    page = Page(page_in('comparison'))
+    assert page.open == [] and set(page.images) == set(FIGURES)
+    for name, source in page.images.items():
+        with open(os.path.join('comparison', name), 'rb') as file:
+            content = file.read()
+        assert content.startswith(b'\x89PNG') and content.endswith(b'IEND\xaeB\x60\x82')
+        assert source == 'data:image/png;base64,' + b64encode(content).decode()
+        assert name in page.links
+    for words in (*VARIANTS, 'What the paper says', 'Difference to the exact solution',
+                  'µs a step', '10,000 Hz', 'the defaults', *comparison_page.TITLES.values()):
+        assert words in page.text
+
+
+def test_all_but_the_timings_is_the_same_in_each_run(monkeypatch):
+    monkeypatch.setattr('dm_ros.comparison.runs.perf_counter', iter(range(10**6)).__next__)
+    for out in 'ab':
+        assert compare('--mechanism', 'symmetric', '--out', out) == 0
+    assert page_in('a') == page_in('b')
+
+
+def test_own_load_and_parameters_are_taken_and_named():
+    with open('IN.csv', 'w') as file:
+        file.write('time,carrier,rear,front\n0,300,-200,-50\n0.2,-300,150,100\n9,0,0,0\n')
+    with open('own.yaml', 'w') as file:
+        file.write('/**:\n  ros__parameters:\n    lsd.clutch.rear.preload: 50.0\n')
+    assert compare('--mechanism', 'lsd', '--torques', 'IN.csv', '--params', 'own.yaml') == 0
+    page = Page(page_in('comparison'))
+    for words in ('IN.csv, the first 0.1 of 9 s', 'own.yaml', 'lsd.clutch.rear.preload 50'):
+        assert words in page.text
+    assert set(page.images) == {name for name, row in FIGURES.items() if row[0] == 'lsd'}
+    assert 'symmetric_ode' not in page.text
+
+
+def test_a_load_at_rest_makes_a_page_without_a_warning(recwarn):
+    with open('IN.csv', 'w') as file:
+        file.write('time,carrier,rear,front\n0,0,0,0\n1,0,0,0\n')
+    assert compare('--mechanism', 'lsd', '--torques', 'IN.csv') == 0
+    assert 'load does not show it' in page_in('comparison')
+    assert not [str(w.message) for w in recwarn if 'dm_ros' in str(w.filename)]
+
+
+BAD = {
+    'unknown column': (['--mechanism', 'lsd', '--torques', 'bad.csv'], 'bad.csv:1:'),
+    'no such load': (['--mechanism', 'lsd', '--torques', 'none.csv'], 'none.csv'),
+    'load of which mechanism': (['--torques', 'bad.csv'], '--mechanism'),
+    'no such parameters': (['--params', 'none.yaml'], 'none.yaml'),
+    'unknown parameter': (['--params', 'bad.yaml'], 'bad.yaml: lsd.colour'),
+    'negative duration': (['--duration', '-1'], 'duration'),
+    'no duration': (['--duration', 'nan'], 'duration'),
+    'too short': (['--duration', '0.01'], 'duration'),
+    'torques beyond all numbers': (['--mechanism', 'lsd', '--torques', 'huge.csv'], 'huge.csv'),
+    'out is a file': (['--out', 'bad.csv'], 'bad.csv'),
+}
+
+
+@pytest.mark.parametrize('name', BAD)
+def test_bad_input_ends_with_one_line_and_leaves_nothing(name, capsys):
+    with open('bad.csv', 'w') as file:
+        file.write('time,pinion\n0,1\n')
+    with open('huge.csv', 'w') as file:
+        file.write('time,carrier,front,rear\n0,1e308,1e308,1e308\n1,0,0,0\n')
+    with open('bad.yaml', 'w') as file:
+        file.write('/**:\n  ros__parameters:\n    lsd.colour: red\n')
+    before = sorted(os.listdir())
+    arguments, words = BAD[name]
+    assert compare(*arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == '' and err.count('\n') == 1 and words in err
+    assert err.startswith('compare_variants: error: ')
+    assert sorted(os.listdir()) == before
+
+
+def test_a_failed_run_leaves_the_page_before_as_it_is():
+    os.mkdir('comparison')
+    with open('comparison/index.html', 'w') as file:
+        file.write('before')
+    assert compare('--params', 'none.yaml') == 2
+    assert page_in('comparison') == 'before'
+
+
+def test_the_progress_bar_ends_where_it_said():
+    for mechanism in MECHANISMS:
+        load, done = Load(mechanism, 0.05), []
+        run(mechanism, load, {}, lambda n=1, done=done: done.append(n))
+        assert sum(done) == ticks_of(mechanism, load)
+
+
+def test_sizes_in_the_table_are_those_of_the_equations():
+    p, q = SymmetricParameters(), SelfLockingParameters()
+    sizes = {'symmetric_ode': 2, 'symmetric_dae': len(SymmetricDae(p).system(1)[0]),
+             'lsd_lagged': len(balance(q, 1)[0]), 'lsd_ode': len(SelfLockingOde(q).system(1)[0]),
+             'lsd_dae': len(SelfLockingDae(q).system(1)[0])}
+    assert {v: nature.matrix for v, nature in comparison_page.NATURES.items()} == sizes
+    assert all(len(n.unknowns.split()) == n.matrix for n in comparison_page.NATURES.values())
+
+
+def test_exact_solution_of_the_symmetric_one_does_not_depend_on_the_tick():
+    p, torques = SymmetricParameters(), (20.0, -30.0, -35.0)
+    once, often = (exact_symmetric(p, [torques] * n, 0.1 / n, (50.0, 60.0)) for n in (1, 64))
+    assert np.allclose(once.speed[-1], often.speed[-1], rtol=1e-14)
+    assert np.allclose(once.moment[-1], often.moment[-1], rtol=1e-13)
+
+
+def test_exact_solution_of_the_self_locking_one_does_not_depend_on_the_tick():
+    p, torques = SelfLockingParameters(), (300.0, -50.0, -200.0)
+    once, often = (exact_self_locking(p, [torques] * n, 0.1 / n, (50.0, 60.0)) for n in (1, 64))
+    assert np.allclose(once.speed[-1], often.speed[-1], rtol=1e-9)
+    assert np.allclose(once.moment[-1], often.moment[-1], rtol=1e-7)
+
+
+def test_symmetric_variants_are_identical_and_switch_together(runs):
+    for rate in RATES:
+        ode, dae = (runs['symmetric'].records[v, rate] for v in variants_of('symmetric'))
+        assert np.abs(ode.main_speeds() - dae.main_speeds()).max() < 1e-9
+        assert (ode.index == dae.index).all()
+
+
+def test_variants_2_and_3_are_the_exact_solution_at_every_rate(runs):
+    for variant in ('lsd_ode', 'lsd_dae'):
+        for rate in RATES:
+            d = measures.difference(runs['lsd'].records[variant, rate], runs['lsd'].exact[rate])
+            assert d.speed < 2e-3 and d.other_index == 0
+    ode, dae = (runs['lsd'].records[v, 1000] for v in ('lsd_ode', 'lsd_dae'))
+    assert np.abs(ode.main_speeds() - dae.main_speeds()).max() < 1e-9
+
+
+def test_error_of_the_lagged_variant_falls_with_the_step_and_it_meets_its_own_yardstick(runs):
+    errors = []
+    for rate in RATES:
+        record = runs['lsd'].records['lsd_lagged', rate]
+        errors.append(measures.difference(record, runs['lsd'].exact[rate]).speed_rms)
+        assert measures.difference(record, runs['lsd'].frozen[rate]).speed < 1e-3
+    assert errors[0] > 5 * errors[1] > 25 * errors[2]
+
+
+def test_lagged_moments_lag_by_a_tick_or_more_in_sliding_while_speeds_are_good(runs):
+    record, exact = runs['lsd'].records['lsd_lagged', 1000], runs['lsd'].exact[1000]
+    lag = measures.lags(record, exact, 1000)
+    front_mesh, rear_mesh, front_clutch, rear_clutch = lag
+    assert abs(front_mesh) < 0.3 and 0.5 < rear_mesh < 1.0
+    assert 0.9 < front_clutch < 1.3 and 1.3 < rear_clutch < 2.0
+    assert measures.difference(record, exact).relative_speed < 1e-3
+    ode = measures.lags(runs['lsd'].records['lsd_ode', 1000], exact, 1000)
+    assert np.abs(ode).max() < 0.01
+
+
+def test_the_lag_of_a_shifted_signal_is_found():
+    class Shifted:
+        index = np.ones(400)
+        time = np.arange(400)
+
+        def moments(self):
+            return np.sin((self.time[:, None] - 1.6) / 20)
+
+        def slip(self):
+            return np.full(400, 50.0)
+
+    class Exact:
+        index = np.ones(400)
+        speed = np.array([[0.0, 50.0, 0.0]] * 400)
+        moment = np.sin(np.arange(400)[:, None] / 20)
+
+    assert measures.lags(Shifted(), Exact(), 1000) == pytest.approx([1.6], abs=1e-2)
+
+
+def test_gear_moments_are_near_40_to_60(runs):
+    shares, _ = measures.gear_share(runs['lsd'].records['lsd_ode', 1000])
+    assert np.median(shares) == pytest.approx(0.4, abs=0.02)
+
+
+def test_it_locks_and_without_proportional_friction_the_shafts_run_apart(runs):
+    with_, without = runs['lsd'].records['lsd_ode', 1000], runs['lsd'].without
+    locked = np.abs(with_.slip()) < measures.LOCKED
+    assert measures.longest_stretch(locked) > 20
+    assert np.abs(without.moment['rear_clutch']).max() < 32.5   # the preload
+    assert np.abs(without.slip()).max() > 1.2 * np.abs(with_.slip()).max()
+
+
+def test_every_statement_of_the_paper_gets_a_number_and_a_verdict(runs):
+    for mechanism, make in compare_variants.CLAIMS.items():
+        for claim in make(runs[mechanism]):
+            assert claim.verdict in comparison_page.VERDICT_CLASSES
+            assert any(c.isdigit() for c in claim.here) or claim.verdict == SILENT
+            assert 'nan' not in claim.here
