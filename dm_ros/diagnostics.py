@@ -15,7 +15,12 @@
 
 """What the node says of itself: conditions that are logged at their ends, and /diagnostics."""
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_msgs.msg import Header
+
+from dm_ros.energy import AuditedSimulation, rated_efficiency
 
 
 class Condition:
@@ -67,3 +72,98 @@ def lateness_values(lateness):
         return f'{lateness[int(share * (len(lateness) - 1))] / 1e3:.1f}' if lateness else 'none'
     return {'lateness p50 [us]': at(0.5), 'lateness p99 [us]': at(0.99),
             'lateness max [us]': at(1.0)}
+
+
+class Diagnostics:
+    """The state of the node as /diagnostics tells it, and the conditions it logs."""
+
+    def __init__(self, name, logger, simulation, pacer, inputs, control):
+        """Take what is looked at; ``name``: of the node."""
+        self.name = name
+        self.simulation, self.pacer, self.inputs, self.control = simulation, pacer, inputs, control
+        self.ticks = 0   # since the node is there
+        self.missing = Condition('ticks are missed', logger)
+        self.coarse = Condition('solver steps are coarse', logger)
+        self.out_of_range = Condition('ticks are refused', logger)
+        self.refusing = Condition('torque messages are refused', logger)
+        self.clamping = Condition('torques are clamped', logger)
+        self.stale = Condition('torques are too old and count as zero', logger)
+        self._before = 0, time.monotonic_ns()
+        self._coarse_before = 0
+
+    def report(self, stamp):
+        """Return the DiagnosticArray of the time since the last report; to be called at 1 Hz."""
+        self._notice()
+        statuses = [self._loop(), self._torques()]
+        if isinstance(self.simulation, AuditedSimulation):
+            statuses.append(self._energy())
+        for condition in (self.missing, self.coarse, self.out_of_range, self.refusing,
+                          self.clamping, self.stale):
+            condition.settle()
+        return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
+
+    def _notice(self):
+        """Count what is not counted where it happens."""
+        missed = self.pacer.missed - self.missing.count
+        if missed > 0:
+            self.missing.happened(f'{missed} since the last report', missed)
+        coarse = self.simulation.coarse_steps
+        if coarse > self._coarse_before:
+            self.coarse.happened('their work reached its bound', coarse - self._coarse_before)
+        self._coarse_before = coarse
+        stale = self.inputs.stale(self.simulation.ticks)
+        if stale:
+            self.stale.happened(', '.join(stale))
+
+    def _loop(self):
+        ticks, now = self.ticks, time.monotonic_ns()
+        (ticks_before, before), self._before = self._before, (ticks, now)
+        running = 'running' if self.control.running.is_set() else 'paused'
+        return status(
+            f'{self.name}: loop', active(self.missing, self.coarse, self.out_of_range), running, {
+                'variant': self.simulation.variant,
+                'rate wanted [Hz]': f'{1.0 / self.simulation.dt:g}',
+                'rate held [Hz]': f'{(ticks - ticks_before) / (now - before) * 1e9:.2f}',
+                **lateness_values(self.pacer.take_lateness()),
+                'ticks': ticks,
+                'missed ticks': self.pacer.missed,
+                'refused ticks': self.out_of_range.count,
+                'coarse solver steps': self.coarse.count,
+                'simulated time [s]': f'{self.simulation.time:.9g}'})
+
+    def _torques(self):
+        inputs = self.inputs
+        silent, stale = inputs.silent(), inputs.stale(self.simulation.ticks)
+        return status(
+            f'{self.name}: torques', active(self.refusing, self.clamping, self.stale),
+            'no torque yet' if len(silent) == len(inputs.shafts) else 'fine', {
+                'received messages': inputs.received,
+                'refused messages': inputs.refused,
+                'last refused': self.refusing.reason or 'none',
+                'clamped messages': inputs.clamped,
+                'stale': ', '.join(stale) or 'none',
+                'without any torque yet': ', '.join(silent) or 'none'})
+
+    def _energy(self):
+        simulation = self.simulation
+        with self.control.lock:   # one and the same tick
+            total, worst, simulation.worst = simulation.total, simulation.worst, 0.0
+            stored, efficiency = simulation.stored_energy, simulation.tick.efficiency
+            returned = dict(simulation.returned)
+        return status(f'{self.name}: energy', [], 'fine', {
+            'worst balance residual since the last report [relative]': f'{worst:.1e}',
+            'work of the torques [J]': f'{sum(total.work):.6g}',
+            'stored [J]': f'{stored:.6g}',
+            'lost by drag [J]': f'{total.viscous:.6g}',
+            'lost in gears and bearings [J]': f'{sum(total.gears) + sum(total.bearings):.6g}',
+            'lost in clutches [J]': f'{sum(total.clutches):.6g}',
+            'taken by the error of the step [J]': f'{total.numerical:.3g}',
+            'rated efficiency': f'{rated_efficiency(simulation.parameters):.6g}',
+            'measured efficiency': 'none' if efficiency is None else f'{efficiency:.6g}',
+            **{f'{name} gave back [J]': f'{part.energy:.6g} in {part.ticks} ticks'
+               for name, part in returned.items()}})
+
+
+def active(*conditions):
+    """Return those of the conditions that hold now."""
+    return [condition for condition in conditions if condition.active]

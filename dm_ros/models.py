@@ -133,9 +133,9 @@ class SelfLockingModel:
         T_0, T_1, T_2 = torque
         return T_0 * x_0, T_1 * x_1 + T_2 * x_2
 
-    def step(self, x, memory, torque, direction):
+    def step(self, x, memory, torque, direction, parts=None):
         """Return x, its integral over the step, the memory, and whether the step was coarse."""
-        return self._stepper.step(x, torque, direction, self._h, self._friction(memory))
+        return self._stepper.step(x, torque, direction, self._h, self._friction(memory), parts)
 
     def internal_moments(self, x, memory, torque, direction):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""

@@ -32,10 +32,11 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Header, Int8
+from std_msgs.msg import Float64, Int8
 from std_srvs.srv import SetBool, Trigger
 
-from dm_ros.diagnostics import Condition, lateness_values, status
+from dm_ros.diagnostics import Diagnostics
+from dm_ros.energy import AuditedSimulation
 from dm_ros.loops import (
     ask_for_priority,
     Control,
@@ -113,7 +114,7 @@ class DifferentialNode(Node):
         self._internal_moments = self.create_publisher(
             JointState, '~/internal_moments', output_qos)
         self._power_flow = self.create_publisher(Int8, '~/power_flow', output_qos)
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', OUTPUT_QOS)
+        self._report = self.create_publisher(DiagnosticArray, '/diagnostics', OUTPUT_QOS)
         self._clock_publisher = (self.create_publisher(ClockMessage, '/clock', output_qos)
                                  if self._settings.publish_clock else None)
         self._simulated_stamps = lockstep or self._settings.publish_clock
@@ -133,17 +134,9 @@ class DifferentialNode(Node):
         self._parameter_services = WholeRequests(self)
         # the steady clock: a timer of the ROS clock stalls when system time steps back
         self.create_timer(1.0, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._ticks = 0   # since the node is there
-        self._diagnosed = 0, time.monotonic_ns()
-
         log = self.get_logger()
-        self._missing = Condition('ticks are missed', log)
-        self._coarse = Condition('solver steps are coarse', log)
-        self._coarse_before = 0
-        self._out_of_range = Condition('ticks are refused', log)
-        self._refusing = Condition('torque messages are refused', log)
-        self._clamping = Condition('torques are clamped', log)
-        self._stale = Condition('torques are too old and count as zero', log)
+        self._diagnostics = Diagnostics(
+            self.get_name(), log, simulation, self._pacer, self._inputs, self.control)
         log.info(f'{simulation.variant} at {self._settings.rate:g} Hz, {self._settings.mode}, '
                  f'torques on {", ".join(simulation.inputs)}')
 
@@ -193,7 +186,8 @@ class DifferentialNode(Node):
                     if shaft not in model.outputs]
         settings = declare(self, settings, lambda name: name not in not_mine)
         parameters = declare(self, model.parameters_type())
-        self.simulation = Simulation(
+        kind = AuditedSimulation if settings.energy_audit else Simulation
+        self.simulation = kind(
             variant, dt=1.0 / settings.rate, parameters=parameters, substeps=settings.substeps,
             power_flow_deadband=settings.deadband,
             initial_velocity=settings.initial_velocity(model.outputs))
@@ -307,7 +301,8 @@ class DifferentialNode(Node):
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         if 0 < stamp <= self._last_stamp:
             self._inputs.refused += 1
-            self._refusing.happened('~/torques: its stamp repeats or goes back in time')
+            self._diagnostics.refusing.happened(
+                '~/torques: its stamp repeats or goes back in time')
         elif self._demand(message.name, message.effort, 'torques'):
             self._last_stamp = stamp or self._last_stamp
             self._tick()
@@ -327,9 +322,9 @@ class DifferentialNode(Node):
         try:
             self.simulation.advance(self._inputs.in_force(self.simulation.ticks))
         except ValueError as error:
-            self._out_of_range.happened(str(error))
+            self._diagnostics.out_of_range.happened(str(error))
         snapshot = self.simulation.snapshot()
-        self._ticks += 1
+        self._diagnostics.ticks += 1
         self._publish(snapshot)
         if self.on_tick:
             self.on_tick(snapshot)
@@ -338,9 +333,10 @@ class DifferentialNode(Node):
         """Take the torques of a message; return whether they were taken."""
         try:
             if self._inputs.demand(names, torques, self.simulation.ticks):
-                self._clamping.happened(f'~/{topic}: beyond {self._inputs.limit:g} N m')
+                self._diagnostics.clamping.happened(
+                    f'~/{topic}: beyond {self._inputs.limit:g} N m')
         except ValueError as error:
-            self._refusing.happened(f'~/{topic}: {error}')
+            self._diagnostics.refusing.happened(f'~/{topic}: {error}')
             return False
         return True
 
@@ -358,49 +354,8 @@ class DifferentialNode(Node):
         self._internal_moments.publish(messages.internal_moments)
         self._power_flow.publish(messages.power_flow)
 
-    # diagnostics
-
     def _diagnose(self):
-        simulation, pacer, inputs = self.simulation, self._pacer, self._inputs
-        ticks, now = self._ticks, time.monotonic_ns()
-        (ticks_before, before), self._diagnosed = self._diagnosed, (ticks, now)
-        paused = not self.control.running.is_set()
-        stale = inputs.stale(simulation.ticks)
-        if pacer.missed > self._missing.count:
-            times = pacer.missed - self._missing.count
-            self._missing.happened(f'{times} since the last report', times)
-        if simulation.coarse_steps > self._coarse_before:
-            times = simulation.coarse_steps - self._coarse_before
-            self._coarse.happened('their work reached its bound', times)
-        self._coarse_before = simulation.coarse_steps
-        if stale:
-            self._stale.happened(', '.join(stale))
-        loop = (self._missing, self._coarse, self._out_of_range)
-        demands = (self._refusing, self._clamping, self._stale)
-        self._diagnostics.publish(DiagnosticArray(
-            header=Header(stamp=self.get_clock().now().to_msg()),
-            status=[
-                status(f'{self.get_name()}: loop', [c for c in loop if c.active],
-                       'paused' if paused else 'running', {
-                    'variant': simulation.variant,
-                    'rate wanted [Hz]': f'{self._settings.rate:g}',
-                    'rate held [Hz]': f'{(ticks - ticks_before) / (now - before) * 1e9:.2f}',
-                    **lateness_values(pacer.take_lateness()),
-                    'ticks': ticks,
-                    'missed ticks': pacer.missed,
-                    'refused ticks': self._out_of_range.count,
-                    'coarse solver steps': simulation.coarse_steps,
-                    'simulated time [s]': f'{simulation.time:.9g}'}),
-                status(f'{self.get_name()}: torques', [c for c in demands if c.active],
-                       'no torque yet' if len(inputs.silent()) == len(inputs.shafts) else 'fine', {
-                    'received messages': inputs.received,
-                    'refused messages': inputs.refused,
-                    'last refused': self._refusing.reason or 'none',
-                    'clamped messages': inputs.clamped,
-                    'stale': ', '.join(stale) or 'none',
-                    'without any torque yet': ', '.join(inputs.silent()) or 'none'})]))
-        for condition in (*loop, *demands):
-            condition.settle()
+        self._report.publish(self._diagnostics.report(self.get_clock().now().to_msg()))
 
 
 def split(changes, *tables):

@@ -317,6 +317,9 @@ class NodeParameters(Parameters):
                                   above_low=True)
     publish_clock: bool = row('publish_clock', False, '', 0, 0,
                               'drive /clock with simulated time', kind=bool, read_only=True)
+    energy_audit: bool = row('energy_audit', True, '', 0, 0,
+                             'keep the energy balance, for /diagnostics', kind=bool,
+                             read_only=True)
     realtime_priority: int = row('realtime_priority', 0, '1', 0, 99,
                                  'SCHED_FIFO priority of the loop, 0 for none',
                                  kind=int, read_only=True)

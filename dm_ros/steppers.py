@@ -263,7 +263,7 @@ class ClutchStep:
 
         return slope, jacobian
 
-    def step(self, y, torque, direction, h, full_friction=None):
+    def step(self, y, torque, direction, h, full_friction=None, parts=None):
         """
         Return ``(y, integral of y, (M_1, M_2, F_1, F_2), coarse)`` at the end of the step.
 
@@ -272,6 +272,8 @@ class ClutchStep:
         :param direction: +1 direct or -1 reverse flow, held.
         :param h: length of the step, s.
         :param full_friction: in place of that given at the start.
+        :param parts: list that gets ``(slope, w, s, (f_w, f_s), J, h, c_w, c_s)`` of each part:
+            its start, f and J there, its length and its correction c.
         """
         slope, jacobian = self.flow(torque, direction, full_friction)
         w, s = y
@@ -289,6 +291,8 @@ class ClutchStep:
                 rw, rs = nonlinear_part(there, here, J_there, -part, -dw - cw, -ds - cs)
                 error = max(error, (abs(rw) + abs(rs)) / (self.BACKWARD * allowed))
             if error <= 1.0:
+                if parts is not None:
+                    parts.append((slope, w, s, here[:2], J, part, cw, cs))
                 angle_w += aw + part * cw / 4
                 angle_s += as_ + part * cs / 4
                 w += dw + cw
@@ -302,6 +306,9 @@ class ClutchStep:
             if part > 0.999 * left:
                 part = left
         w_end, s_end = backward_euler(slope, w, s, here, J, left)
+        if parts is not None:   # a straight line
+            parts.append((slope, w, s, ((w_end - w) / left, (s_end - s) / left),
+                          (0.0, 0.0, 0.0, 0.0), left, 0.0, 0.0))
         angle_w += left * (w + w_end) / 2
         angle_s += left * (s + s_end) / 2
         return (w_end, s_end), (angle_w, angle_s), moments_at(slope(w_end, s_end)), True

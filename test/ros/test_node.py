@@ -281,6 +281,29 @@ def test_diagnostics_tell_the_rate_the_lateness_and_the_inputs(ros):
     assert torques['without any torque yet'] == 'pinion, left, right'
 
 
+@pytest.mark.parametrize('variant', ['symmetric_dae', 'lsd_ode'])
+def test_diagnostics_tell_that_the_energy_balances(ros, variant):
+    node = ros.differential(variant, torque_timeout=0.0)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    torque = ros.publisher(JointState, '/differential/torques')
+    torque.publish(JointState(name=list(node.simulation.inputs), effort=[30.0, -9.0, -11.0]))
+    ros.until(lambda: diagnostics and float(
+        keys(diagnostics, 'energy')[0]['work of the torques [J]']) > 10.0)
+    energy, _ = keys(diagnostics, 'energy')
+    assert float(energy['worst balance residual since the last report [relative]']) < 1e-9
+    spent = sum(float(energy[key]) for key in (
+        'stored [J]', 'lost by drag [J]', 'lost in gears and bearings [J]',
+        'lost in clutches [J]'))
+    assert spent == pytest.approx(float(energy['work of the torques [J]']), rel=1e-4)
+
+
+def test_without_the_energy_audit_nothing_is_said_of_energy(ros):
+    ros.differential(energy_audit=False)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    ros.until(lambda: diagnostics)
+    assert len(diagnostics[-1].status) == 2
+
+
 def test_several_differentials_live_in_their_namespaces(ros):
     ros.differential(arguments=['--ros-args', '-r', '__ns:=/front_axle'])
     ros.differential('lsd_ode', arguments=['--ros-args', '-r', '__node:=centre'])

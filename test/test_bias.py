@@ -1,0 +1,232 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The limits of the torque split are those at which the simulated shafts begin to slip."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+from mechanisms import BOTH, random_self_locking
+import numpy as np
+import pytest
+
+from dm_ros import SelfLockingParameters, Simulation
+from dm_ros.bias import friction_for, main, torque_bias
+from dm_ros.self_locking import slip_steepness
+
+
+def without_drag(p):
+    return dataclasses.replace(p, l_0=0.0, l_1=0.0, l_2=0.0, l_s=0.0)
+
+
+def mechanisms(count=15, seed=1):
+    """Yield parameters without viscous drag, those of Table 2 first, and a carrier torque."""
+    rng = np.random.default_rng(seed)
+    yield without_drag(SelfLockingParameters()), 300.0
+    for _ in range(count):
+        p = without_drag(random_self_locking(rng))
+        preload = p.f[0] * p.n_s * p.N_1 * p.R_1 + p.f[1] * p.n_s * p.N_2 * p.R_2
+        yield p, 2.0 * preload + rng.uniform(50, 300)   # enough to turn both shafts
+
+
+def turning(p, torque, split, direction, slip, ticks, far=math.inf):
+    """
+    Return the slips omega_1 - omega_2 over ticks of 1 ms, and the speeds at both ends.
+
+    It ends early when the slip is as large as ``far``.
+    """
+    simulation = Simulation('lsd_ode', 1e-3, p,
+                            initial_velocity=(2000.0 + slip / 2, 2000.0 - slip / 2))
+    start = simulation.snapshot().velocity
+    torques = [direction * torque, *(-direction * side for side in split)]
+    slips = [slip]
+    for _ in range(ticks):
+        velocity = simulation.step(torques).velocity
+        slips.append(velocity[1] - velocity[2])
+        if abs(slips[-1]) >= far:
+            break
+    assert simulation.snapshot().power_flow == direction
+    return slips, start, velocity
+
+
+@pytest.mark.parametrize('direction', BOTH)
+def test_the_shafts_slip_steadily_under_the_limits(direction):
+    for p, torque in mechanisms():
+        for split, sign in zip(torque_bias(p, torque, direction), (-1, 1), strict=True):
+            # so much slip that tanh is 1
+            _, start, end = turning(p, torque, split, direction, 800.0 * sign, 100)
+            assert end == pytest.approx(start, abs=1e-6)
+
+
+@pytest.mark.parametrize('direction', BOTH)
+def test_the_shafts_stay_together_within_the_limits_and_part_beyond_them(direction):
+    for p, torque in mechanisms():
+        steep = 1 / min(map(abs, slip_steepness(p)))   # rad/s of slip for tanh(1)
+        limits = torque_bias(p, torque, direction)
+        for share in (-0.1, 0.1, 0.5, 0.9, 1.1):   # from rear to front lagging
+            split = [share * a + (1 - share) * b for a, b in zip(*limits, strict=True)]
+            slips, *_ = turning(p, torque, split, direction, 0.0, 5000, far=20 * steep)
+            if 0.0 < share < 1.0:
+                assert abs(slips[-1]) < 5 * steep
+            else:
+                assert abs(slips[-1]) >= 20 * steep
+                assert slips[-1] * (share - 0.5) < 0.0
+
+
+def test_table_2_shifts_a_large_torque_to_58_percent_front_and_70_percent_rear():
+    front_lagging, rear_lagging = torque_bias(SelfLockingParameters())
+    assert front_lagging.share.front == pytest.approx(0.583, abs=5e-4)
+    assert rear_lagging.share.rear == pytest.approx(0.704, abs=5e-4)
+
+
+@pytest.mark.parametrize('direction', BOTH)
+def test_a_large_torque_nears_the_limit_without_preload(direction):
+    for p, _ in mechanisms():
+        limits = torque_bias(p, direction=direction)
+        without = torque_bias(dataclasses.replace(p, N_1=0.0, N_2=0.0), 123.0, direction)
+        large = torque_bias(p, 1e9, direction)
+        for limit, one, other in zip(limits, without, large, strict=True):
+            assert one.share == pytest.approx(limit.share, rel=1e-12)
+            assert other.share == pytest.approx(limit.share, abs=1e-5)
+
+
+def test_without_friction_and_losses_the_gears_alone_split_40_to_60():
+    p = SelfLockingParameters(mu_1=0.0, mu_2=0.0, eta_0B=1.0, eta_1G=1.0, eta_2G=1.0)
+    for direction in BOTH:
+        for split in torque_bias(p, 300.0, direction):
+            assert split == pytest.approx((120.0, 180.0))
+
+
+def with_friction(p, friction):
+    """Return the parameters with clutches that have the given x_k."""
+    return dataclasses.replace(p, **{
+        f'mu_{k}': x / math.tan(p.alpha) / getattr(p, f'n_F{k}')
+        * getattr(p, f'R_{k}') / getattr(p, f'R_F{k}')
+        for k, x in (('1', friction.front), ('2', friction.rear))})
+
+
+def test_friction_for_the_limits_of_a_mechanism_is_its_own():
+    rng = np.random.default_rng(2)
+    for _ in range(40):
+        p = random_self_locking(rng)
+        most, least = torque_bias(p)
+        friction = friction_for(p, most.share.front, least.share.rear)
+        own = [math.tan(p.alpha) * f_k for f_k in p.f]
+        assert friction[:2] == pytest.approx(own, rel=1e-9, abs=1e-9)
+        assert friction.admissible
+
+
+def test_70_and_85_percent_need_stronger_clutches_than_those_of_table_2_and_are_admissible():
+    p = SelfLockingParameters()
+    friction = friction_for(p, 0.70, 0.85)
+    assert friction.admissible
+    f = friction.front / math.tan(p.alpha), friction.rear / math.tan(p.alpha)
+    assert f == pytest.approx((1.607, 1.484), abs=5e-4)   # docs/bias.md
+    assert p.f == pytest.approx((0.15, 1.35))
+    assert [x_k / own for x_k, own in zip(f, p.f)] == pytest.approx((10.7, 1.10), rel=5e-3)
+    stronger = with_friction(p, friction)   # is not refused
+    front_lagging, rear_lagging = torque_bias(stronger)
+    assert front_lagging.share.front == pytest.approx(0.70)
+    assert rear_lagging.share.rear == pytest.approx(0.85)
+
+
+def test_the_example_of_the_docs_reaches_70_and_85_percent():
+    p = SelfLockingParameters(n_F1=11, n_F2=10)
+    front_lagging, rear_lagging = torque_bias(p)
+    assert front_lagging.share.front == pytest.approx(0.705, abs=5e-4)
+    assert rear_lagging.share.rear == pytest.approx(0.855, abs=5e-4)
+
+
+@pytest.mark.parametrize('torque', [100, 300, 1000, math.inf])
+def test_the_docs_give_the_limits_of_table_2(torque):
+    cells = ['large' if math.isinf(torque) else str(torque)]
+    for direction in (1, -1):
+        for side in (0, 1):
+            shares = sorted(100 * split.share[side] for split in
+                            torque_bias(SelfLockingParameters(), torque, direction))
+            cells.append('{:.1f} % to {:.1f} %'.format(*shares))
+    text = (Path(__file__).parents[1] / 'docs' / 'bias.md').read_text()
+    assert '| ' + ' | '.join(cells) + ' |' in text
+
+
+def test_friction_that_would_lock_the_mechanism_is_told():
+    p = SelfLockingParameters()
+    for shares in ((0.999, 0.999), (0.2, 0.9), (0.95, 0.3)):
+        friction = friction_for(p, *shares)
+        assert not friction.admissible
+        with pytest.raises(ValueError, match='locks itself|not allowed'):
+            with_friction(p, friction)
+
+
+@pytest.mark.parametrize('shares', [(0.0, 0.8), (0.7, 1.0), (0.3, 0.6), (math.nan, 0.8)])
+def test_shares_that_are_none_are_refused(shares):
+    with pytest.raises(ValueError, match='shares'):
+        friction_for(SelfLockingParameters(), *shares)
+
+
+@pytest.mark.parametrize('torque', [0.0, -3.0, math.nan])
+def test_torque_that_does_not_drive_is_refused(torque):
+    with pytest.raises(ValueError, match='torque'):
+        torque_bias(SelfLockingParameters(), torque)
+
+
+def test_torque_too_small_against_the_preload_is_refused():
+    with pytest.raises(ValueError, match='does not turn'):
+        torque_bias(SelfLockingParameters(eta_1G=0.8, eta_2G=0.8), 0.1)
+
+
+# The command
+
+
+def test_command_says_the_limits_in_two_lines(capsys):
+    assert main([]) == 0
+    out = capsys.readouterr().out
+    assert out.splitlines() == [
+        'this parameter set can send 25.8 % to 65.0 % of 300 N m to the front '
+        'and 35.0 % to 74.2 % to the rear',
+        'this parameter set can send 29.6 % to 58.3 % of a large torque to the front '
+        'and 41.7 % to 70.4 % to the rear']
+    text = (Path(__file__).parents[1] / 'docs' / 'bias.md').read_text()
+    for line in out.splitlines():
+        assert f'    {line}\n' in text
+
+
+def test_command_reads_parameters_and_the_direction(capsys, tmp_path):
+    path = tmp_path / 'p.yaml'
+    path.write_text('/**: {ros__parameters: {lsd: {clutch: {front: {friction_surfaces: 2}}}}}')
+    assert main(['--params', str(path), '--torque', '1000', '--reverse']) == 0
+    out = capsys.readouterr().out
+    assert 'of 1000 N m that brakes the carrier from the front' in out
+    main(['--torque', '1000', '--reverse'])
+    assert capsys.readouterr().out != out
+
+
+@pytest.mark.parametrize('arguments, message', [
+    (['--torque', '0'], '--torque: 0.0'), (['--torque', 'nan'], '--torque: nan'),
+    (['--torque', 'inf'], '--torque: inf'),
+    (['--params', 'nowhere.yaml'], 'nowhere.yaml: No such')])
+def test_command_refuses_bad_input_in_one_line(arguments, message, capsys):
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert not out and err.startswith('bias: error: ') and message in err
+    assert err.count('\n') == 1
+
+
+def test_command_names_an_impossible_parameter(tmp_path, capsys):
+    path = tmp_path / 'p.yaml'
+    path.write_text('/**: {ros__parameters: {lsd.clutch.rear.friction_surfaces: 90}}')
+    assert main(['--params', str(path)]) == 2
+    assert 'lsd.clutch.rear' in capsys.readouterr().err
