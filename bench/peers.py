@@ -24,9 +24,10 @@ the two output shafts after each tick, (ticks, 3).
 import dataclasses
 
 import numpy as np
-from reference import ClutchMotion, slip_shares, three_shafts
+from reference import slip_shares, three_shafts
 from scipy.integrate import solve_ivp
 
+from dm_ros.comparison.reference import ClutchMotion
 from dm_ros.parameters import SymmetricParameters
 from dm_ros.power_flow import DIRECT, power_flow, REVERSE
 from dm_ros.steppers import held_torque_propagator
@@ -120,7 +121,7 @@ class SolveIvp:
         motion = ClutchMotion(p)
 
         def right_side(T, direction):
-            slope = motion.slope(T, direction)
+            slope = motion.slope(T, direction, motion.full_friction)
             return lambda t, y: slope(float(y[0]), float(y[1]))[:2]
         return right_side
 
@@ -276,7 +277,7 @@ class TwoHinges:
 
         def apply(force, slope):
             w, s = qvel.tolist()
-            _, _, F_1, F_2, *_ = slope(w, side * s)
+            *_, F_1, F_2 = slope(w, side * s)
             force[1] -= side * (a_1 * F_1 - a_2 * F_2)
         return apply
 
@@ -285,7 +286,7 @@ class TwoHinges:
         applied, apply = data.qfrc_applied, self._slip(data.qvel)
         if self._friction == 'before':
             for row, T in rows:
-                slope = motion.slope(T, DIRECT)
+                slope = motion.slope(T, DIRECT, motion.full_friction)
                 applied[:] = row
                 apply(applied, slope)
                 step(model, data)
@@ -297,7 +298,7 @@ class TwoHinges:
         mujoco.set_mjcb_passive(callback)
         try:
             for row, T in rows:
-                slope = motion.slope(T, DIRECT)
+                slope = motion.slope(T, DIRECT, motion.full_friction)
                 applied[:] = row
                 step(model, data)
         finally:
@@ -378,7 +379,7 @@ class AllHinges(TwoHinges):
     def _slip(self, qvel):
         def apply(force, slope):
             w_0, w_1, w_2, *_ = qvel.tolist()
-            _, _, F_1, F_2, *_ = slope(w_0, w_1 - w_2)
+            *_, F_1, F_2 = slope(w_0, w_1 - w_2)
             force[0] += F_1 + F_2
             force[1] -= F_1
             force[2] -= F_2
