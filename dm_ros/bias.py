@@ -37,6 +37,7 @@ from dm_ros.parameter_file import of_table, read_parameter_file
 from dm_ros.parameters import SelfLockingParameters
 from dm_ros.power_flow import DIRECT
 from dm_ros.self_locking import full_friction
+from dm_ros.tool import run_tool
 
 
 class Split(NamedTuple):
@@ -161,22 +162,21 @@ def parser():
     return result
 
 
+def run(arguments):
+    """Do what the command line says; raise ValueError or OSError where it cannot be done."""
+    values = read_parameter_file(arguments.params) if arguments.params else {}
+    p = SelfLockingParameters().changed(of_table(values, SelfLockingParameters))
+    if not 0.0 < arguments.torque < math.inf:
+        raise ValueError(f'--torque: {arguments.torque!r} is not allowed, '
+                         'it must be a number of N m above 0')
+    for torque in (arguments.torque, math.inf):
+        print(sentence(p, torque, -DIRECT if arguments.reverse else DIRECT))
+
+
 def main(args=None):
     """Run the tool ``bias`` and return its exit code."""
     arguments = parser().parse_args(args)
-    direction = -DIRECT if arguments.reverse else DIRECT
-    try:
-        values = read_parameter_file(arguments.params) if arguments.params else {}
-        p = SelfLockingParameters().changed(of_table(values, SelfLockingParameters))
-        if not 0.0 < arguments.torque < math.inf:
-            raise ValueError(f'--torque: {arguments.torque!r} is not allowed, '
-                             'it must be a number of N m above 0')
-        print(sentence(p, arguments.torque, direction))
-        print(sentence(p, math.inf, direction))
-    except ValueError as error:
-        print('bias: error:', ' '.join(str(error).splitlines()), file=sys.stderr)
-        return 2
-    return 0
+    return run_tool('bias', lambda: run(arguments), 'stdout')
 
 
 if __name__ == '__main__':

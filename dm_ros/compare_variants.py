@@ -18,7 +18,6 @@
 import argparse
 from io import BytesIO
 import os
-import signal
 import sys
 
 from dm_ros.comparison.claims import symmetric_claims
@@ -32,6 +31,7 @@ from dm_ros.parameter_file import read_parameter_file
 from dm_ros.plot import require_matplotlib
 from dm_ros.progress import progress
 from dm_ros.simulation import checked
+from dm_ros.tool import run_tool
 from dm_ros.torque_table import read_torque_file
 
 TABLE_SECONDS = 30.0   # of a CSV, without --duration
@@ -91,6 +91,8 @@ def loads(arguments):
 def compare(arguments):
     """Do what the command line says; raise ValueError or OSError where it cannot be done."""
     require_matplotlib()
+    if os.path.exists(arguments.out) and not os.path.isdir(arguments.out):
+        raise ValueError(f'{arguments.out}: there is a file of this name')
     values = read_parameter_file(arguments.params) if arguments.params else {}
     chosen, source = loads(arguments)
     if arguments.params:
@@ -126,27 +128,7 @@ def compare(arguments):
 def main(args=None):
     """Run the tool ``compare_variants`` and return its exit code."""
     arguments = parser().parse_args(args)
-    # as an exception it removes unfinished files
-    before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
-    try:
-        if os.path.exists(arguments.out) and not os.path.isdir(arguments.out):
-            raise ValueError(f'{arguments.out}: there is a file of this name')
-        compare(arguments)
-    except KeyboardInterrupt:
-        return 128 + signal.SIGINT
-    except OSError as error:
-        return failed(f'{error.filename or arguments.out}: {error.strerror}')
-    except ValueError as error:
-        return failed(error)
-    finally:
-        signal.signal(signal.SIGTERM, before)
-    return 0
-
-
-def failed(error):
-    """Report an error in one line and return the exit code."""
-    print('compare_variants: error:', ' '.join(str(error).splitlines()), file=sys.stderr)
-    return 2
+    return run_tool('compare_variants', lambda: compare(arguments), arguments.out)
 
 
 if __name__ == '__main__':

@@ -19,7 +19,6 @@ import argparse
 from array import array
 from contextlib import ExitStack
 import os
-import signal
 import sys
 
 import numpy as np
@@ -31,6 +30,7 @@ from dm_ros.parameters import NodeParameters
 from dm_ros.plot import require_matplotlib, save_plot
 from dm_ros.progress import progress
 from dm_ros.simulation import Simulation
+from dm_ros.tool import run_tool
 from dm_ros.torque_table import read_torque_file
 
 EPILOG = """\
@@ -146,28 +146,8 @@ def run(arguments):
 def main(args=None):
     """Run the tool ``simulate`` and return its exit code."""
     arguments = parser().parse_args(args)
-    # as an exception it removes unfinished files
-    before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
-    try:
-        run(arguments)
-    except KeyboardInterrupt:
-        return 128 + signal.SIGINT
-    except BrokenPipeError:   # as when a pager was left
-        return 128 + signal.SIGPIPE
-    except OSError as error:
-        outputs = [path for path in (arguments.out, arguments.plot) if path] or ['stdout']
-        return failed(f'{error.filename or ", ".join(outputs)}: {error.strerror}')
-    except ValueError as error:
-        return failed(error)
-    finally:
-        signal.signal(signal.SIGTERM, before)
-    return 0
-
-
-def failed(error):
-    """Report an error in one line and return the exit code."""
-    print('simulate: error:', ' '.join(str(error).splitlines()), file=sys.stderr)
-    return 2
+    outputs = [path for path in (arguments.out, arguments.plot) if path] or ['stdout']
+    return run_tool('simulate', lambda: run(arguments), ', '.join(outputs))
 
 
 if __name__ == '__main__':
