@@ -284,7 +284,7 @@ class DifferentialNode(Node):
             if settings.mode == 'lockstep':
                 follow_messages(control, self._torques, self.context, self._lockstep_tick)
             elif self._follows_clock:
-                follow_ros_clock(control, self._pacer, self.get_clock(), self._realtime_tick)
+                follow_ros_clock(control, self._pacer, self.get_clock(), self._followed_tick)
             else:
                 follow_steady_clock(control, self._pacer, self._realtime_tick)
         except Exception as error:
@@ -295,6 +295,11 @@ class DifferentialNode(Node):
     def _realtime_tick(self):
         self._take_torques()
         self._tick()
+
+    def _followed_tick(self):
+        """Tick with the deadline as the stamp: a leap of the clock brings several at one time."""
+        self._take_torques()
+        self._tick(divmod(self._pacer.begun, 10**9))
 
     def _lockstep_tick(self, message):
         """Advance one tick with a message and answer it, or refuse both."""
@@ -317,15 +322,15 @@ class DifferentialNode(Node):
         for message, _ in poll(self._torques):
             self._demand(message.name, message.effort, 'torques')
 
-    def _tick(self):
-        """Advance one tick and publish."""
+    def _tick(self, stamp=None):
+        """Advance one tick and publish; stamp: seconds and nanoseconds, None for those of now."""
         try:
             self.simulation.advance(self._inputs.in_force(self.simulation.ticks))
         except ValueError as error:
             self._diagnostics.out_of_range.happened(str(error))
         snapshot = self.simulation.snapshot()
         self._diagnostics.ticks += 1
-        self._publish(snapshot)
+        self._publish(snapshot, stamp)
         if self.on_tick:
             self.on_tick(snapshot)
 
@@ -340,10 +345,10 @@ class DifferentialNode(Node):
             return False
         return True
 
-    def _publish(self, snapshot):
+    def _publish(self, snapshot, stamp=None):
         if self._simulated_stamps:
             stamp = divmod(round(self.simulation.ticks * 1e9 / self._settings.rate), 10**9)
-        else:
+        elif stamp is None:
             stamp = self.get_clock().now().seconds_nanoseconds()
         messages = self._messages
         messages.fill(snapshot, *stamp)

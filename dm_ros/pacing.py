@@ -50,6 +50,11 @@ class Pacer:
         """When the next tick is due."""
         return self._start + int(self._count * self.period)
 
+    @property
+    def begun(self):
+        """When the tick that was begun last was due, ns."""
+        return self._start + int((self._count - 1) * self.period)
+
     def begin(self, now):
         """Begin the tick that is due, at ``now`` or earlier; note its lateness."""
         lateness = now - self.due

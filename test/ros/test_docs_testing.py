@@ -1,0 +1,72 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The code blocks of docs/testing.md are test files that pass."""
+
+from pathlib import Path
+import re
+
+pytest_plugins = ['pytester']
+
+ROOT = Path(__file__).parents[2]
+BLOCKS = re.findall(r'^```python\n# (\w+)\.py\n(.*?)^```', (
+    ROOT / 'docs' / 'testing.md').read_text(), re.MULTILINE | re.DOTALL)
+
+
+def test_the_blocks_of_the_page_run(pytester):
+    pytester.makepyfile(**dict(BLOCKS))
+    tests = sum(source.count('\ndef test_') for _, source in BLOCKS)
+    assert tests == 5
+    pytester.runpytest_subprocess('--differential-records', 'left').assert_outcomes(passed=tests)
+    assert not (pytester.path / 'left').exists()
+
+
+def test_the_failing_test_of_a_user_leaves_each_of_its_differentials(pytester):
+    pytester.makepyfile(**{name: source for name, source in BLOCKS if name == 'governor'})
+    pytester.makepyfile(test_it="""
+        from governor import Governor, SpeedLaw
+
+        def test_too_much(differential):
+            for target in (5.0, 10.0):
+                vehicle = differential()
+                vehicle.attach(Governor(SpeedLaw(target, 0.001), context=vehicle.context))
+                record = vehicle.run(seconds=0.1)
+            assert record.velocity['carrier'].max() < 0.0
+    """)
+    pytester.runpytest_subprocess('--differential-records', 'left').assert_outcomes(failed=1)
+    left = sorted(path.name for path in (pytester.path / 'left').iterdir())
+    assert left == [f'test_it.py_test_too_much_{n}.{kind}' for n in (1, 2)
+                    for kind in ('csv', 'png')]
+
+
+def test_an_exception_in_a_node_of_the_test_is_the_test_s(pytester):
+    pytester.makepyfile(test_it="""
+        import pytest
+        from rclpy.node import Node
+        from sensor_msgs.msg import JointState
+
+        def test_it(differential):
+            vehicle = differential()
+            node = Node('broken', context=vehicle.context)
+            node.create_publisher(JointState, 'differential/torques', 10)
+
+            def fail(joints):
+                raise ZeroDivisionError
+            node.create_subscription(JointState, 'differential/joint_states', fail, 10)
+            vehicle.attach(node)
+            with pytest.raises(ZeroDivisionError):
+                vehicle.run(seconds=1.0)
+    """)
+    pytester.runpytest_subprocess().assert_outcomes(passed=1)

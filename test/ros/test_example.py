@@ -1,0 +1,110 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The worked example through topics: a controller, tested as its developer would."""
+
+import math
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / 'examples'))
+
+import brake_lock
+
+from dm_ros.testing import DirectDifferential
+
+ROOT = Path(__file__).parents[2]
+OPEN, BRAKE, LSD = brake_lock.CASES
+
+
+@pytest.fixture
+def run_case(differential):
+    """Return a function that runs a case through topics: to its ``Run``."""
+    def run_case(case, seconds):
+        vehicle = differential(case.variant, brake_lock.RATE, brake_lock.parameters_of(case))
+        car = brake_lock.attach(vehicle, case)
+        return brake_lock.as_run(case, vehicle.run(seconds), car)
+    return run_case
+
+
+def grip_lost(run):
+    """Return when the slip of the left tyre passes the peak of its curve, s."""
+    p = brake_lock.CarParameters()
+    _, left, *_ = run.record.velocity.values()
+    speed = run.car['speed']
+    slip = (p.wheel_radius * left - speed) / (speed + p.creep_speed)
+    peak = math.tan(math.pi / (2 * p.tyre_shape)) / p.tyre_stiffness
+    return run.record.time[np.argmax(slip > peak)]
+
+
+def test_the_lock_stops_the_slip_of_a_wheel_that_lost_its_grip(run_case):
+    free, locked = run_case(OPEN, 1.5), run_case(BRAKE, 1.5)
+    lost = grip_lost(free)
+    assert 0.1 < lost < 0.4
+    slip, after = locked.record.slip, locked.record.time - grip_lost(locked)
+    assert slip.max() < 6.0                     # rad/s
+    assert abs(slip[after > 0.8]).max() < 3.5   # the lock allows 3
+    slip, after = free.record.slip, free.record.time - lost
+    assert (np.diff(slip[after > 0.0]) > 0.0).all()
+    assert slip[after > 0.8].min() > 30.0
+    assert locked.car['speed'][-1] > 5 * free.car['speed'][-1]
+
+
+def test_the_self_locking_axle_pulls_better_than_the_open_one(run_case):
+    free, lsd = run_case(OPEN, 1.0), run_case(LSD, 1.0)
+    assert lsd.car['speed'][-1] > 4 * free.car['speed'][-1]
+    assert lsd.record.moment['rear_mesh'][-1] > 1.3 * free.record.moment['right_mesh'][-1]
+
+
+@pytest.mark.parametrize('case', brake_lock.CASES, ids=[case.name for case in brake_lock.CASES])
+def test_through_topics_and_direct_are_the_same_to_the_last_bit(run_case, case):
+    topics, direct = run_case(case, 0.6), brake_lock.run(case, 0.6, direct=True)
+    for name, values in direct.record.columns.items():
+        assert (topics.record.columns[name] == values).all(), name
+    for name, values in direct.car.items():
+        assert (topics.car[name] == values).all(), name
+
+
+def test_a_reset_of_all_repeats_the_run(differential):
+    vehicle = differential(BRAKE.variant, brake_lock.RATE, brake_lock.parameters_of(BRAKE))
+    car = brake_lock.attach(vehicle, BRAKE)
+    first = vehicle.run(0.5)
+    vehicle.reset()
+    for node in vehicle.executor.get_nodes():
+        if hasattr(node, 'restart'):
+            node.restart()
+    again = vehicle.run(0.5)
+    assert car.brakes[0] > 0.0
+    for name, values in first.columns.items():
+        assert (again.columns[name] == values).all(), name
+
+
+def test_the_command_draws_the_picture(tmp_path):
+    done = subprocess.run(
+        [sys.executable, ROOT / 'examples' / 'brake_lock.py', '--seconds', '0.3',
+         '--out', tmp_path / 'out'], env=os.environ, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()[2:5]] == ['open', 'brake', 'lsd']
+    assert (tmp_path / 'out' / 'example.png').read_bytes().startswith(b'\x89PNG')
+    direct = DirectDifferential(LSD.variant, brake_lock.RATE,
+                                parameters=brake_lock.parameters_of(LSD))
+    direct.run(brake_lock.law_of(direct, LSD)[0], 0.3)
+    direct.record.save_csv(tmp_path / 'direct.csv')
+    assert (tmp_path / 'out' / 'lsd.csv').read_bytes() == (tmp_path / 'direct.csv').read_bytes()
