@@ -201,12 +201,11 @@ class ClutchStep:
 
     def flow(self, torque, direction, full_friction=None):
         """
-        Return the functions ``slope``, ``jacobian`` and ``bend`` of the motion in held torques.
+        Return the functions ``slope`` and ``jacobian`` of the motion under held torques.
 
         ``slope(w, s)`` gives ``(dw/dt, ds/dt, F_1, F_2, M_1, M_2, ...)`` at the carrier speed w
-        and the slip s. The other two take that whole, as ``point``: ``jacobian(point)`` gives
-        (J_ww, J_ws, J_sw, J_ss), and ``bend(point, s, ds)`` a measure in rad/s^2 of what the
-        clutches bend away from it on the way from s to s + ds.
+        and the slip s; what follows is for ``jacobian``, which takes it whole and gives
+        (J_ww, J_ws, J_sw, J_ss).
         """
         (A11, A12, C11, C12, P11, P12, W11, W12,
          A21, A22, C21, C22, P21, P22, W21, W22) = self._speed[direction]

@@ -1,0 +1,348 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What a differential keeps to whatever is asked of it, checked shortly and, in ``long``, at length.
+
+``Tally``   random cases: one of the variants with random admissible parameters, spread over many
+            powers of ten, a random rate, start and load; case n is the same in every run
+``endure``  one load for a long time at 100 Hz
+"""
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from dm_ros import (
+    self_locking,
+    SelfLockingParameters,
+    Simulation,
+    symmetric,
+    SymmetricParameters,
+    VARIANTS,
+)
+from dm_ros.models import MODELS
+from dm_ros.self_locking import SelfLockingDae
+from dm_ros.symmetric import SymmetricDae
+
+ROUNDING = 1e-14     # of the largest term of a constraint
+TORQUE_LIMIT = 1e5   # N m
+
+
+class Case(NamedTuple):
+    """One random differential and what happens to it."""
+
+    variant: str
+    arguments: dict   # of ``Simulation``
+    load: list        # torques of each tick
+
+
+def power_of_ten(rng, low, high):
+    return float(10.0 ** rng.uniform(low, high))
+
+
+def or_zero(rng, value):
+    return 0.0 if rng.random() < 0.2 else value
+
+
+def efficiency(rng):
+    return float(rng.choice([1.0, rng.uniform(0.95, 1.0), rng.uniform(0.3, 1.0)]))
+
+
+def elements(rng, names):
+    """Return inertias from 1e-5 to 1e3 kg m^2 and viscosities to 10 N m s/rad."""
+    narrow = rng.random() < 0.3   # a mechanism whose parts fit each other
+    centre = rng.uniform(-4, 2)
+    values = {}
+    for name in names:
+        values[f'I_{name}'] = (power_of_ten(rng, centre - 1, centre + 1) if narrow
+                               else power_of_ten(rng, -5, 3))
+        values[f'l_{name}'] = or_zero(rng, power_of_ten(rng, -5, 1))
+    return values
+
+
+def symmetric_parameters(rng):
+    return SymmetricParameters(
+        **elements(rng, '0123s'), n_s=int(rng.integers(1, 9)),
+        g_F=float(rng.choice([-1, 1])) * power_of_ten(rng, -1, 1.5),
+        g_2s=power_of_ten(rng, -1, 1),
+        **{name: efficiency(rng) for name in ('eta_3B', 'eta_FG', 'eta_0B', 'eta_1G', 'eta_2G')})
+
+
+def self_locking_parameters(rng):
+    """Return parameters of which the gain of a clutch reaches 0.99 of what locks it."""
+    values = {
+        **elements(rng, '012s'), 'n_s': int(rng.integers(1, 9)), 'g_2s': power_of_ten(rng, -1, 1),
+        'R_1': power_of_ten(rng, -2, 0), 'alpha': or_zero(rng, rng.uniform(0.01, 0.8)),
+        **{name: efficiency(rng) for name in ('eta_0B', 'eta_1G', 'eta_2G')}}
+    values['R_2'] = values['R_1'] * power_of_ten(rng, -0.7, 0.7)
+    for k in '12':
+        radius = values[f'R_{k}'] * rng.uniform(0.5, 2.0)
+        surfaces = int(rng.integers(0, 13))
+        share = rng.choice([0.0, 0.99, rng.uniform(0.0, 0.99)])
+        gain = share * values[f'eta_{k}G'] * values['eta_0B']
+        for_one = max(surfaces, 1) * radius / values[f'R_{k}'] * math.tan(values['alpha'])
+        values |= {
+            f'R_F{k}': radius, f'n_F{k}': surfaces,
+            f'mu_{k}': min(gain / for_one, 10.0) if for_one else rng.uniform(0.0, 1.0),
+            f'c_f{k}': or_zero(rng, power_of_ten(rng, -1, 3)),
+            f'N_{k}': or_zero(rng, power_of_ten(rng, 0, 4))}
+    return SelfLockingParameters(**values)
+
+
+def load(rng, ticks):
+    """Return torques to 1e5 N m: none, held, by steps, with flipping signs or new every tick."""
+    size = rng.choice([0.0, 1e-3, 30.0, 1e3, TORQUE_LIMIT])
+    kind = rng.choice(['held', 'steps', 'flips', 'noise', 'balanced', 'limits'])
+    if kind == 'held':
+        T = np.tile(rng.uniform(-size, size, 3), (ticks, 1))
+    elif kind == 'steps':
+        T = np.repeat(rng.uniform(-size, size, (ticks // 4 + 1, 3)), 4, axis=0)[:ticks]
+        T[rng.random(ticks) < 0.2] = 0.0
+    elif kind == 'flips':
+        T = rng.uniform(-size, size, 3) * (-1.0) ** np.arange(ticks)[:, None]
+    elif kind == 'noise':
+        T = rng.uniform(-size, size, (ticks, 3))
+    elif kind == 'balanced':
+        T = rng.uniform(-size, size, (ticks, 1)) * np.array([1.0, 0.0, 0.0])
+        T[:, 1] = -T[:, 0] * rng.uniform(0.0, 1.0)
+        T[:, 2] = -T[:, 0] - T[:, 1]
+    else:
+        T = rng.choice([-size, 0.0, size], (ticks, 3))
+    return T.tolist()
+
+
+def random_case(n):
+    """Return case n; the variants take turns."""
+    rng = np.random.default_rng([3, n])
+    variant = VARIANTS[n % len(VARIANTS)]
+    parameters = (symmetric_parameters if variant.startswith('symmetric')
+                  else self_locking_parameters)(rng)
+    rate = float(rng.choice([100.0, 1000.0, 1e4, power_of_ten(rng, 2, 4)]))
+    speed = rng.choice([0.0, rng.normal(0.0, 50.0), 1e4, 1e6], p=[0.3, 0.3, 0.3, 0.1])
+    start = speed * rng.choice([-1.0, 1.0, rng.uniform(-1, 1)], 2)
+    arguments = {'dt': 1 / rate, 'parameters': parameters,
+                 'substeps': int(rng.choice([1, 1, 1, 2, 5])),
+                 'power_flow_deadband': or_zero(rng, power_of_ten(rng, -3, 4)),
+                 'initial_velocity': tuple(start.tolist())}
+    return Case(variant, arguments, load(rng, int(rng.integers(4, 13))))
+
+
+class Bound:
+    """
+    How fast the torques can make the speeds grow, by the energy.
+
+    With v such that |v|^2/2 is the kinetic energy, v' = A v + b gives d|v|/dt <= mu |v| + |b|,
+    where mu is the logarithmic norm of A. It is not positive where the losses are losses. It
+    may be where a moment does not have the sign that fits the direction of power flow: the
+    efficiencies of the paper then add power. Whatever part of their full friction the clutches
+    have, A and b are averages of those at the corners, full to either side and none; norms are
+    convex, so the largest at the corners bounds them all.
+    """
+
+    def __init__(self, variant, p):
+        model, formulation = MODELS[variant]
+        self._lagged = variant == 'lsd_lagged'
+        self._phi, self._preload = (0.0, 0.0), (0.0, 0.0)
+        inertia = [p.I_0, p.I_1, p.I_2, p.n_s * p.I_s]
+        if model.parameters_type is SymmetricParameters:
+            inertia.insert(3, p.I_3)
+            shafts = symmetric.kinematics(p)
+        else:
+            self._phi, self._preload = self_locking.full_friction(p)
+            shafts = self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p))
+        self._to_v = np.linalg.qr(np.sqrt(inertia)[:, None] * shafts, 'r')
+        self._growth, torque, friction = 0.0, [], []
+        for direction in (1, -1):
+            for A, B, K in self._corners(formulation(p).response(direction)):
+                A = self._to_v @ A @ np.linalg.inv(self._to_v)
+                self._growth = max(self._growth, float(np.linalg.eigvalsh((A + A.T) / 2)[-1]))
+                torque.append(self._to_v @ B)
+                friction.append(self._to_v @ K)
+        self._torque, self._friction = np.array(torque), np.array(friction)
+
+    def _corners(self, r):
+        """Yield A, B and K of x' = A x + B T - K (friction that does not follow M)."""
+        if isinstance(r, symmetric.LinearResponse):
+            yield r.A, r.B[:, [2, 0, 1]], np.zeros((2, 2))
+            return
+        corners = itertools.product((-1.0, 0.0, 1.0), repeat=2)
+        for shares in ([(0.0, 0.0)] if self._lagged else corners):
+            X = np.diag(np.multiply(shares, self._phi))   # F = X M + the rest
+            K = r.C @ np.linalg.inv(np.eye(2) + X @ r.W)
+            yield r.A - K @ X @ r.P, r.B - K @ X @ r.Q, K
+
+    def norm(self, x):
+        """Return |v|, the root of twice the kinetic energy."""
+        return float(np.linalg.norm(self._to_v @ x))
+
+    def after(self, norm, torque, M, dt):
+        """Return the largest |v| after a step; variant 1 has its friction from the last M."""
+        rest = np.add(self._preload, np.multiply(self._phi, np.abs(M)) * self._lagged)
+        # one slip drives both clutches, to opposite sides
+        sides = rest[:, None] * np.array([[1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+        push = (np.linalg.norm(self._torque @ torque, axis=1).max()
+                + np.linalg.norm(self._friction @ sides, axis=1).max())
+        growth = math.exp(self._growth * dt) if self._growth * dt < 600.0 else math.inf
+        return growth * (norm + dt * float(push))
+
+
+class Tally:
+    """What was counted over many cases, and the worst that was seen."""
+
+    def __init__(self):
+        self.cases = self.ticks = self.coarse_cases = self.coarse_steps = 0
+        self.residual = 0.0   # of a constraint, over its largest term
+        self.fullest = 0.0    # speeds, over what energy allows
+
+    def __str__(self):
+        return (f'{self.cases} cases, {self.ticks} ticks, {self.coarse_steps} coarse steps in '
+                f'{self.coarse_cases} cases, worst constraint residual {self.residual:.1e} of '
+                f'its largest term, speeds up to {self.fullest:.6f} of what energy allows')
+
+    def run(self, n):
+        """Run case n; raise AssertionError, with the case, whatever goes wrong."""
+        case = random_case(n)
+        try:
+            self._run(*case)
+        except Exception as error:
+            raise AssertionError(f'case {n}: {error!r}: {case}') from error
+
+    def _run(self, variant, arguments, load):
+        p, dt = arguments['parameters'], arguments['dt']
+        simulation, bound = Simulation(variant, **arguments), Bound(variant, p)
+        # what the friction of variant 1 knows changes between the substeps
+        bounded = variant != 'lsd_lagged' or simulation.substeps == 1
+        g = constraints(variant, p)
+        before = simulation.snapshot()
+        self._check(before, g)
+        for tick, torque in enumerate(load, 1):
+            after = simulation.step(torque)
+            self._check(after, g)
+            assert after.time == tick * dt, after.time
+            assert after.torque == tuple(torque), after.torque
+            if bounded:
+                speed = bound.norm(independent(after, p))
+                allowed = bound.after(bound.norm(independent(before, p)), torque,
+                                      before.moment[:2], dt)
+                assert speed <= allowed * (1 + 1e-9), (speed, allowed)
+                self.fullest = max(self.fullest, speed / allowed if allowed else 0.0)
+            before = after
+        self.cases += 1
+        self.ticks += len(load)
+        self.coarse_cases += simulation.coarse_steps > 0
+        self.coarse_steps += simulation.coarse_steps
+
+    def _check(self, snapshot, g):
+        """Check what holds at every moment; g: the constraints."""
+        numbers = (*snapshot.velocity, *snapshot.position, *snapshot.moment)
+        assert all(map(math.isfinite, numbers)), snapshot
+        assert snapshot.power_flow in (1, -1), snapshot.power_flow
+        for values in (snapshot.velocity, snapshot.position):
+            residual = largest_residual(g, values)
+            assert residual < ROUNDING, (residual, values)
+            self.residual = max(self.residual, residual)
+        if len(snapshot.moment) == 4:   # friction opposes slip; the satellite turns with the rear
+            _, _, front, rear = snapshot.moment
+            slip = -snapshot.velocity[-1]
+            assert front * slip >= 0.0 >= rear * slip, (front, rear, slip)
+
+
+def constraints(variant, p):
+    """Return the matrix g with g omega = 0 for the speeds of all shafts, (47), (80)."""
+    formulation = SymmetricDae if variant.startswith('symmetric') else SelfLockingDae
+    return formulation(p).constraints()
+
+
+def largest_residual(g, values):
+    """Return how far speeds or angles are off the constraints, over the largest term of each."""
+    terms = g * np.array(values)
+    largest = np.abs(terms).max(axis=1)
+    return float((np.abs(terms.sum(axis=1)) / np.where(largest > 0.0, largest, 1.0)).max())
+
+
+def independent(snapshot, p):
+    """Return the two speeds that a model integrates."""
+    omega = snapshot.velocity
+    if isinstance(p, SymmetricParameters):
+        return omega[1:3]
+    return omega[0], -omega[3] * p.g_2s * (1 + p.g_12)   # omega_1 - omega_2, not yet rounded
+
+
+# Endurance
+
+
+PERIOD, DT = 1000, 0.01   # ticks of a load, s
+
+
+def steady_load(variant, kind):
+    """Return the torques of a period: constant, or swinging through both power flows and slip."""
+    if kind == 'rest':
+        return [(0.0, 0.0, 0.0)] * PERIOD
+    ratio, share = (3.517, 0.5) if variant.startswith('symmetric') else (1.0, 0.4)
+    if kind == 'constant':
+        return [(50.0 / ratio, -19.0, -28.0)] * PERIOD
+    torques = []
+    for n in range(PERIOD):
+        phase = 2 * math.pi * n / PERIOD
+        drive = 200.0 * math.sin(2 * phase) + 80.0 * math.sin(5 * phase + 0.5)
+        load = 3.0 + 15.0 * math.sin(phase + 1.5) - drive
+        front = share + (0.01 if variant.startswith('symmetric') else 0.28) * math.sin(3 * phase)
+        torques.append((drive / ratio, front * load, (1.0 - front) * load))
+    return torques
+
+
+class Endured(NamedTuple):
+    """What a long run came to."""
+
+    ticks: int
+    time: float           # s
+    speed: float          # rad/s, the largest at the end
+    turned: float         # rad, the largest angle since it had settled
+    residual: float       # the worst of a constraint, speeds or angles, over its largest term
+    angle_error: float    # of the angles beside the sum of speeds, over the largest angle
+    coarse_steps: int
+
+
+def endure(variant, kind, settle, periods):
+    """
+    Repeat a load at 100 Hz for some periods and return what it came to.
+
+    When it has settled, the speeds over one period are summed by trapezoids: the angles of all
+    periods from then on should be that sum, as often as there were periods.
+    """
+    simulation, load = Simulation(variant, DT), steady_load(variant, kind)
+    g = constraints(variant, simulation.parameters)
+    residual, turn, start = 0.0, None, None
+    for period in range(periods):
+        if period == settle:
+            start = simulation.snapshot()
+            speeds = np.array([start.velocity, *(simulation.step(T).velocity for T in load)])
+            turn = (speeds[1:] + speeds[:-1]).sum(axis=0) / 2 * DT
+        else:
+            for T in load:
+                simulation.advance(T)
+        if period % 100 == 0 or period == periods - 1:
+            now = simulation.snapshot()
+            residual = max(residual, largest_residual(g, now.velocity),
+                           largest_residual(g, now.position))
+    turned = np.subtract(now.position, start.position)
+    largest = float(np.abs(turned).max())
+    error = float(np.abs(turned - turn * (periods - settle)).max()) / (largest or 1.0)
+    return Endured(simulation.ticks, now.time, max(map(abs, now.velocity)), largest, residual,
+                   error, simulation.coarse_steps)

@@ -1,0 +1,157 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whatever is asked of a differential, it keeps to its laws; at length in ``long``."""
+
+import contextlib
+import io
+from pathlib import Path
+import re
+
+from mechanisms import random_symmetric, symmetric_speeds
+import numpy as np
+from properties import DT, endure, PERIOD, random_case, Tally
+import pytest
+
+from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
+from dm_ros.power_flow import DIRECT, REVERSE
+from dm_ros.symmetric import SymmetricOde
+
+ROOT = Path(__file__).parents[1]
+EACH_VARIANT = pytest.mark.parametrize('variant', VARIANTS)
+
+
+# Random cases
+
+
+@pytest.mark.parametrize('first', range(0, 1500, 500))
+def test_no_random_differential_breaks_a_law_or_fails(first):
+    tally = Tally()
+    for n in range(first, first + 500):
+        tally.run(n)
+    assert tally.cases == 500
+    assert tally.ticks >= 2000
+    assert tally.coarse_steps < tally.ticks / 100
+
+
+def test_random_cases_are_as_wild_as_they_are_meant_to_be():
+    cases = [random_case(n) for n in range(1000)]
+    assert repr(cases[7]) == repr(random_case(7))
+    assert {case.variant for case in cases} == set(VARIANTS)
+    assert max(abs(T) for case in cases for torque in case.load for T in torque) == 1e5
+    rates = [1 / case.arguments['dt'] for case in cases]
+    assert (min(rates), max(rates)) == pytest.approx((100, 1e4))
+    parameters = [case.arguments['parameters'] for case in cases]
+    inertias = [p.I_1 for p in parameters]
+    assert min(inertias) < 1e-4 and max(inertias) > 300
+    assert {np.sign(p.g_F) for p in parameters if isinstance(p, SymmetricParameters)} == {-1, 1}
+    locking = [p for p in parameters if isinstance(p, SelfLockingParameters)]
+    shares = [np.tan(p.alpha) * p.f[0] / p.eta_1G / p.eta_0B for p in locking]
+    assert min(shares) == 0.0 and max(shares) == pytest.approx(0.99)
+    assert min(p.c_f1 for p in locking) == 0.0 and max(p.c_f1 for p in locking) > 500
+
+
+# Endurance
+
+
+@EACH_VARIANT
+@pytest.mark.parametrize('kind', ['rest', 'constant', 'periodic'])
+def test_nothing_drifts_in_some_minutes(kind, variant):
+    end = endure(variant, kind, settle=15, periods=20)
+    assert end.ticks == 20 * PERIOD
+    assert end.time == end.ticks * DT
+    assert end.residual < 1e-14
+    if kind == 'rest':
+        assert (end.speed, end.turned) == (0.0, 0.0)
+    else:
+        assert end.turned > 1e3
+        assert end.angle_error < 1e-5
+    assert end.coarse_steps == 0
+
+
+# Accuracy of the symmetric variants
+
+
+def exponential(Z):
+    """Return e^Z in extended precision, by Taylor's series of Z/2^k, squared k times."""
+    k = max(0, int(np.log2(float(np.abs(Z).sum(axis=1).max())))) + 3
+    term = total = np.eye(len(Z), dtype=np.longdouble)
+    for n in range(1, 25):
+        term = term @ Z / (n * np.longdouble(2)**k)
+        total = total + term
+    for _ in range(k):
+        total = total @ total
+    return total
+
+
+def exact_symmetric(p, load, dt):
+    """Return speeds and angles of the output shafts, (ticks, 4), in extended precision."""
+    steps = {}
+    for direction in (DIRECT, REVERSE):
+        response = SymmetricOde(p).response(direction)
+        Z = np.zeros((7, 7), np.longdouble)   # of speeds, angles, (T_1, T_2, T_3)
+        Z[:2, :2], Z[:2, 4:], Z[2:4, :2] = response.A, response.B, np.eye(2)
+        steps[direction] = exponential(Z * np.longdouble(dt))[:4]
+    state, direction, states = np.zeros(4, np.longdouble), DIRECT, []
+    for T_3, T_1, T_2 in load:
+        _, w_1, w_2, w_3, _ = symmetric_speeds(p, *state[:2])
+        drive, output = abs(T_3 * w_3), abs(T_1 * w_1 + T_2 * w_2)
+        if drive or output:
+            direction = DIRECT if drive > output else REVERSE
+        state = steps[direction] @ np.array([*state, T_1, T_2, T_3], np.longdouble)
+        states.append(state)
+    return np.array(states)
+
+
+@pytest.mark.parametrize('rate', [1000, 100])
+@pytest.mark.parametrize('parameters', [SymmetricParameters(),
+                                        random_symmetric(np.random.default_rng(21))])
+def test_symmetric_speeds_and_angles_are_exact_for_ten_thousand_ticks(parameters, rate):
+    dt, rng = 1 / rate, np.random.default_rng(20)
+    phase = np.arange(10_000)[:, None] * dt + [0, 1, 2]
+    load = 20 * np.sin(phase) + rng.normal(0, 30, phase.shape)
+    exact = exact_symmetric(parameters, load, dt)
+    for variant in ('symmetric_ode', 'symmetric_dae'):
+        simulation = Simulation(variant, dt, parameters)
+        snapshots = [simulation.step(T) for T in load]
+        for field, expected in (('velocity', exact[:, :2]), ('position', exact[:, 2:])):
+            got = np.array([getattr(s, field)[1:3] for s in snapshots])
+            assert np.abs(got - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+# The page on the power-flow index
+
+
+def table_rows(text):
+    """Return the rows of a Markdown table whose first cell is a variant, {key: numbers}."""
+    cells = [[cell.strip(' `') for cell in line.strip('| ').split('|')]
+             for line in text.splitlines() if re.match(r'\| *`?(symmetric|lsd)_', line)]
+    return {tuple(row[:3]): [float(cell) for cell in row[3:]] for row in cells}
+
+
+def test_the_page_on_the_power_flow_index_prints_what_it_says():
+    page = (ROOT / 'docs' / 'power-flow.md').read_text()
+    code, = re.findall(r'```python\n(.*?)```', page, re.DOTALL)
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(code, 'power-flow.md', 'exec'), {})
+    said, got = table_rows(page), table_rows(printed.getvalue())
+    assert len(said) == 32
+    assert list(said) == list(got)
+    for key, numbers in said.items():
+        switches, *others = numbers
+        # the last bits, which differ between machines, may move a switch by a tick
+        assert got[key][0] == pytest.approx(switches, rel=0.02, abs=2 if switches > 1 else 0), key
+        assert got[key][1:] == pytest.approx(others, rel=0.02, abs=1.0), key
