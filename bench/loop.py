@@ -129,7 +129,7 @@ def node(rate, variant, path):
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.parameter import Parameter
 
-    from dm_ros.node import DifferentialNode
+    from dm_ros.node import DifferentialNode, SWITCH_INTERVAL
     rclpy.init()
     differential = DifferentialNode(parameter_overrides=[
         Parameter('variant', value=variant), Parameter('rate', value=float(rate))])
@@ -137,6 +137,7 @@ def node(rate, variant, path):
     differential._pacer = watched_pacer(rate, timeline)
     executor = SingleThreadedExecutor()
     executor.add_node(differential)
+    sys.setswitchinterval(SWITCH_INTERVAL)   # as main() of the node does
     differential.start()
     try:
         executor.spin()
@@ -159,6 +160,24 @@ def publisher(rate, shaft):
         publish(Float64(data=float(n % 20 - 10)))
         n = max(n + 1, int((time.monotonic() - start) * rate))
         time.sleep(max(0.0, start + n / rate - time.monotonic()))
+
+
+def setter(parameter):
+    """Set a parameter ten times a second, until SIGTERM."""
+    from rcl_interfaces.srv import SetParameters
+    import rclpy
+    from rclpy.parameter import Parameter
+    rclpy.init()
+    me = rclpy.create_node('setter')
+    client = me.create_client(SetParameters, '/differential/set_parameters')
+    n = 0
+    while rclpy.ok():
+        if client.service_is_ready():
+            n += 1
+            value = Parameter(parameter, value=0.1 + 0.001 * (n % 2)).to_parameter_msg()
+            future = client.call_async(SetParameters.Request(parameters=[value]))
+            rclpy.spin_until_future_complete(me, future, timeout_sec=1.0)
+        time.sleep(0.1)
 
 
 def round_trips(shaft, index, path):
@@ -224,7 +243,7 @@ def describe(name, rows, rate, reference, path, trips=None):
     return cells
 
 
-def run_rate(rate, arguments, folder, c_loop):
+def run_rate(rate, arguments, folder, c_loop, with_setter=False):
     """Return the rows of one rate."""
     me = [sys.executable, __file__]
     children = []
@@ -238,6 +257,9 @@ def run_rate(rate, arguments, folder, c_loop):
         ('pinion', 'left') if arguments.variant.startswith('symmetric') else ('carrier', 'front'))
     child(*me, 'publisher', rate, input_shaft)
     child(*me, 'round_trips', output_shaft, 1, folder / 'trips')
+    if with_setter:
+        mechanism = 'symmetric' if input_shaft == 'pinion' else 'lsd'
+        child(*me, 'setter', f'{mechanism}.inertia.carrier')
     time.sleep(arguments.settle)
     timed = [child(*me, 'python_loop', rate, length, folder / 'python')]
     if c_loop:
@@ -255,7 +277,8 @@ def run_rate(rate, arguments, folder, c_loop):
     rows = {name: r[r[:, 0] >= first] for name, r in rows.items()}
     reference = seconds_of(rows['c'], rate) if 'c' in rows else Counter()
     trips = np.frombuffer((folder / 'trips').read_bytes())
-    names = {'c': 'C, clock_nanosleep', 'python': 'Python, no work', 'node': 'node'}
+    names = {'c': 'C, clock_nanosleep', 'python': 'Python, no work',
+             'node': 'node, parameters set at 10 Hz' if with_setter else 'node'}
     return [describe(names[name], rows[name], rate, reference, folder / name,
                      trips if name == 'node' else None) for name in rows]
 
@@ -287,6 +310,7 @@ ROLES = {
     'node': lambda rate, variant, path: node(float(rate), variant, Path(path)),
     'publisher': lambda rate, shaft: publisher(float(rate), shaft),
     'python_loop': lambda rate, s, path: python_loop(float(rate), float(s), Path(path)),
+    'setter': setter,
     'round_trips': lambda shaft, index, path: round_trips(shaft, int(index), Path(path)),
 }
 
@@ -307,10 +331,11 @@ def main():
     with own_domain() as domain, tempfile.TemporaryDirectory() as folder:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         c_loop = compiled(Path(folder))
-        for rate in arguments.rates:
-            sub = Path(folder) / f'{rate:g}'
+        # each rate, and the last one once more with a client that sets parameters
+        for n, rate in enumerate([*arguments.rates, arguments.rates[-1]]):
+            sub = Path(folder) / str(n)
             sub.mkdir()
-            for cells in run_rate(rate, arguments, sub, c_loop):
+            for cells in run_rate(rate, arguments, sub, c_loop, n == len(arguments.rates)):
                 print('| ' + ' | '.join(cells) + ' |', flush=True)
         if not c_loop:
             print('\nno C compiler here: no C loop')

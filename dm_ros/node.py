@@ -65,6 +65,8 @@ from dm_ros.ros_parameters import declare, given_parameters, WholeRequests
 from dm_ros.simulation import Simulation
 from dm_ros.torque_inputs import TorqueInputs
 
+SWITCH_INTERVAL = 1e-4   # s that the loop waits at most for a service to let go of the interpreter
+
 HELP = """\
 A vehicle differential in real time: torques in as topics, speeds and internal moments out.
 
@@ -387,6 +389,7 @@ def main(args=None):
         executor.add_node(node)
         gc.collect()
         gc.freeze()   # a full collection takes tens of ms; this leaves it little to look at
+        sys.setswitchinterval(SWITCH_INTERVAL)
         node.start()
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):

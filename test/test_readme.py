@@ -19,6 +19,7 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree
 
+import pytest
 import yaml
 
 from dm_ros import Simulation, VARIANTS
@@ -70,16 +71,34 @@ def test_the_changelog_begins_with_the_version_of_the_package():
     assert re.search(r'^(\d+\.\d+\.\d+) \(', changelog, re.MULTILINE).group(1) == version
 
 
-def test_every_file_that_is_linked_is_there():
-    links = re.findall(r'\]\(([^)#:]+)\)', README)
-    assert links
-    for link in links:
-        assert (ROOT / link).exists(), link
+PAGES = [ROOT / 'README.md', ROOT / 'examples' / 'README.md',
+         *sorted((ROOT / 'docs').glob('*.md'))]
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: f'{page.parent.name}-{page.stem}')
+def test_every_file_that_is_linked_is_there(page):
+    text = re.sub(r'^    .*$', '', page.read_text(), flags=re.MULTILINE)   # no code
+    for link in re.findall(r'\]\(([^)#:]+)\)', text):
+        assert (page.parent / link).exists(), link
+
+
+def test_the_readme_links_to_every_page():
+    for page in (ROOT / 'docs').glob('*.md'):
+        assert f'](docs/{page.name})' in README, page.name
+
+
+def test_every_test_that_the_physics_page_names_is_there():
+    names = re.findall(r'`(test_\w+)`', (ROOT / 'docs' / 'physics.md').read_text())
+    tests = ''.join(path.read_text() for path in (ROOT / 'test').glob('test_*.py'))
+    assert len(names) > 5
+    for name in names:
+        assert f'def {name}' in tests, name
 
 
 def test_every_make_target_that_is_named_is_there():
     targets = set(re.findall(r'^([a-z-]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
-    assert set(re.findall(r'make ([a-z][a-z-]*)', README)) <= targets
+    for page in PAGES:
+        assert set(re.findall(r'`make ([a-z][a-z-]*)', page.read_text())) <= targets, page
 
 
 def test_every_dependency_of_setup_has_its_rosdep_key():
