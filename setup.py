@@ -33,7 +33,7 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
-        (f'share/{NAME}/config', glob('config/*.yaml')),
+        (f'share/{NAME}/config', glob('config/*.yaml') + glob('config/*.xml')),
     ],
     zip_safe=True,
     python_requires='>=3.11',
@@ -49,7 +49,7 @@ setup(
             'bias = dm_ros.bias:main',
             'compare_variants = dm_ros.compare_variants:main',
             'demo = dm_ros.demo:main',
-            'differential = dm_ros.node:main',
+            'differential = dm_ros.differential:main',
             'play_torques = dm_ros.play_torques:main',
             'simulate = dm_ros.simulate:main',
         ],

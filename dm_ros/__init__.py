@@ -15,7 +15,20 @@
 
 """A vehicle differential in software, in the loop: the library, without ROS."""
 
-from dm_ros.parameters import SelfLockingParameters, SymmetricParameters
-from dm_ros.simulation import Simulation, Snapshot, VARIANTS
+from importlib import import_module
 
-__all__ = ['SelfLockingParameters', 'Simulation', 'Snapshot', 'SymmetricParameters', 'VARIANTS']
+# loaded when they are asked for: a tool shall answer to signals before it loads numpy and scipy
+HOMES = {
+    'SelfLockingParameters': 'dm_ros.parameters',
+    'Simulation': 'dm_ros.simulation',
+    'Snapshot': 'dm_ros.simulation',
+    'SymmetricParameters': 'dm_ros.parameters',
+    'VARIANTS': 'dm_ros.simulation',
+}
+__all__ = sorted(HOMES)
+
+
+def __getattr__(name):
+    if name not in HOMES:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    return getattr(import_module(HOMES[name]), name)

@@ -31,7 +31,7 @@ import time
 
 from dm_ros.domain import own_domain
 from dm_ros.models import VARIANTS
-from dm_ros.output_file import write_csv
+from dm_ros.output_file import replacing, write_csv
 from dm_ros.plot import save_plot
 from dm_ros.progress import progress
 from dm_ros.recorder import Recorder
@@ -159,7 +159,8 @@ def main(args=None):
         csv = arguments.out / f'{arguments.variant}.csv'
         png = arguments.out / f'{arguments.variant}.png'
         write_csv(columns, csv)
-        save_plot(columns, png, f'{arguments.variant} at {arguments.rate:g} Hz')
+        with replacing(png, 'wb') as file:
+            save_plot(columns, file, f'{arguments.variant} at {arguments.rate:g} Hz')
     except KeyboardInterrupt:
         return 128 + signal.SIGINT
     except (OSError, RuntimeError, ValueError) as error:

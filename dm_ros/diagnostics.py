@@ -77,9 +77,9 @@ def lateness_values(lateness):
 class Diagnostics:
     """The state of the node as /diagnostics tells it, and the conditions it logs."""
 
-    def __init__(self, name, logger, simulation, pacer, inputs, control):
+    def __init__(self, name, logger, simulation, pacer, inputs, control, neighbours):
         """Take what is looked at; ``name``: of the node."""
-        self.name = name
+        self.name, self.neighbours = name, neighbours
         self.simulation, self.pacer, self.inputs, self.control = simulation, pacer, inputs, control
         self.ticks = 0   # since the node is there
         self.missing = Condition('ticks are missed', logger)
@@ -88,17 +88,19 @@ class Diagnostics:
         self.refusing = Condition('torque messages are refused', logger)
         self.clamping = Condition('torques are clamped', logger)
         self.stale = Condition('torques are too old and count as zero', logger)
+        self.misfitting = Condition('QoS does not fit', logger)
+        self.ambiguous = Condition('another node has the same name', logger)
         self._before = 0, time.monotonic_ns()
         self._coarse_before = 0
 
     def report(self, stamp):
         """Return the DiagnosticArray of the time since the last report; to be called at 1 Hz."""
         self._notice()
-        statuses = [self._loop(), self._torques()]
+        statuses = [self._loop(), self._torques(), self._connections()]
         if isinstance(self.simulation, AuditedSimulation):
             statuses.append(self._energy())
         for condition in (self.missing, self.coarse, self.out_of_range, self.refusing,
-                          self.clamping, self.stale):
+                          self.clamping, self.stale, self.misfitting, self.ambiguous):
             condition.settle()
         return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
 
@@ -143,6 +145,18 @@ class Diagnostics:
                 'clamped messages': inputs.clamped,
                 'stale': ', '.join(stale) or 'none',
                 'without any torque yet': ', '.join(silent) or 'none'})
+
+    def _connections(self):
+        misfits = '; '.join(f'{t}: {what}' for t, what in self.neighbours.misfits().items())
+        namesakes = self.neighbours.namesakes()
+        if misfits:
+            self.misfitting.happened(misfits)
+        if namesakes:
+            self.ambiguous.happened(f'{namesakes} more')
+        return status(
+            f'{self.name}: connections', active(self.misfitting, self.ambiguous), 'fine', {
+                'QoS that does not fit': misfits or 'none',
+                'other nodes of the same name': namesakes})
 
     def _energy(self):
         simulation = self.simulation

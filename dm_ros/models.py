@@ -34,7 +34,7 @@ def responses_of(equations):
     with np.errstate(all='ignore'):
         try:
             responses = {d: equations.response(d) for d in (DIRECT, REVERSE)}
-        except np.linalg.LinAlgError:
+        except (ArithmeticError, np.linalg.LinAlgError):
             responses = {}
     if not responses or not all(np.isfinite(m).all() for r in responses.values() for m in r):
         raise ValueError(f'{equations.p.prefix}: the equations of these parameters have no '

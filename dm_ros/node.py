@@ -17,6 +17,8 @@
 
 import argparse
 import gc
+import os
+import signal
 import sys
 import threading
 import time
@@ -24,11 +26,11 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 import rclpy
-from rclpy._rclpy_pybind11 import RCLInvalidROSArgsError
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
@@ -37,6 +39,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from dm_ros.diagnostics import Diagnostics
 from dm_ros.energy import AuditedSimulation
+from dm_ros.leftovers import remove_leftovers
 from dm_ros.loops import (
     ask_for_priority,
     Control,
@@ -56,6 +59,7 @@ from dm_ros.messages import (
     SnapshotMessages,
 )
 from dm_ros.models import MODELS
+from dm_ros.neighbours import Neighbours
 from dm_ros.pacing import Pacer
 from dm_ros.parameters import (
     known_rows,
@@ -112,12 +116,13 @@ class DifferentialNode(Node):
         output_qos = LOCKSTEP_OUTPUT_QOS if lockstep else OUTPUT_QOS
         self._messages = SnapshotMessages(
             simulation.shafts, simulation.inputs, simulation.moments)
-        self._joint_states = self.create_publisher(JointState, '~/joint_states', output_qos)
-        self._internal_moments = self.create_publisher(
+        self._neighbours = Neighbours(self)
+        self._joint_states = self._publisher(JointState, '~/joint_states', output_qos)
+        self._internal_moments = self._publisher(
             JointState, '~/internal_moments', output_qos)
-        self._power_flow = self.create_publisher(Int8, '~/power_flow', output_qos)
-        self._report = self.create_publisher(DiagnosticArray, '/diagnostics', OUTPUT_QOS)
-        self._clock_publisher = (self.create_publisher(ClockMessage, '/clock', output_qos)
+        self._power_flow = self._publisher(Int8, '~/power_flow', output_qos)
+        self._report = self._publisher(DiagnosticArray, '/diagnostics', OUTPUT_QOS)
+        self._clock_publisher = (self._publisher(ClockMessage, '/clock', output_qos)
                                  if self._settings.publish_clock else None)
         self._simulated_stamps = lockstep or self._settings.publish_clock
 
@@ -129,6 +134,8 @@ class DifferentialNode(Node):
         self._torques = self.create_subscription(
             JointState, '~/torques', never_called,
             LOCKSTEP_INPUT_QOS if lockstep else SHARED_QOS, callback_group=polled)
+        if lockstep:   # in real time publishers of all kinds are heard
+            self._neighbours.watch('~/torques', 'RELIABILITY')
 
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_service(SetBool, '~/pause', self._pause)
@@ -138,7 +145,8 @@ class DifferentialNode(Node):
         self.create_timer(1.0, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
         log = self.get_logger()
         self._diagnostics = Diagnostics(
-            self.get_name(), log, simulation, self._pacer, self._inputs, self.control)
+            self.get_name(), log, simulation, self._pacer, self._inputs, self.control,
+            self._neighbours)
         log.info(f'{simulation.variant} at {self._settings.rate:g} Hz, {self._settings.mode}, '
                  f'torques on {", ".join(simulation.inputs)}')
 
@@ -173,6 +181,10 @@ class DifferentialNode(Node):
         self.destroy_node()
         if self._failure:
             raise self._failure
+
+    def _publisher(self, message_type, topic, qos):
+        return self.create_publisher(message_type, topic, qos,
+                                     event_callbacks=self._neighbours.of_publisher(topic))
 
     # parameters
 
@@ -306,7 +318,7 @@ class DifferentialNode(Node):
     def _lockstep_tick(self, message):
         """Advance one tick with a message and answer it, or refuse both."""
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        if 0 < stamp <= self._last_stamp:
+        if stamp and stamp <= self._last_stamp:
             self._inputs.refused += 1
             self._diagnostics.refusing.happened(
                 '~/torques: its stamp repeats or goes back in time')
@@ -380,27 +392,43 @@ def parser():
 def main(args=None):
     """Run the node until SIGINT or SIGTERM; return the exit code."""
     args = sys.argv if args is None else ['differential', *args]
+    signals = (signal.SIGINT, signal.SIGTERM)
+    ended = threading.Event()
+    for number in signals:
+        signal.signal(number, lambda *_: ended.set())
+    if 'HOME' not in os.environ and (home := os.path.expanduser('~')) != '~':
+        os.environ['HOME'] = home   # where rclpy has its logs
     node = None
     try:
         parser().parse_args(remove_ros_args(args)[1:])
-        rclpy.init(args=args)
+        remove_leftovers()
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = DifferentialNode()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         gc.collect()
         gc.freeze()   # a full collection takes tens of ms; this leaves it little to look at
         sys.setswitchinterval(SWITCH_INTERVAL)
-        node.start()
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+        # these call those above and shut the context down, which breaks whatever uses it
+        install_signal_handlers()
+        if not ended.is_set():
+            node.start()
+            executor.spin()
+    except ExternalShutdownException:
         pass
-    except (ValueError, ParameterException, RCLInvalidROSArgsError) as error:
+    except Exception as error:
+        if ended.is_set():
+            return 0
+        if node or not isinstance(error, (ValueError, ParameterException, RuntimeError)):
+            raise
         print('differential: error:', ' '.join(str(error).split()), file=sys.stderr)
-        return 2
+        return 2   # RuntimeError: of rclpy, such as an unwritable folder for its logs
     finally:
         if node:
             node.close()
         rclpy.try_shutdown()
+        for number in signals:
+            signal.signal(number, signal.SIG_IGN)
     return 0
 
 

@@ -55,8 +55,10 @@ def replacing(path, mode):
         with file:
             yield file
         os.replace(unfinished, os.path.join(folder, name))
-    except BaseException:
+    except BaseException as error:
         os.unlink(unfinished)
+        if isinstance(error, OSError) and error.filename is None:   # as on a full disk
+            raise OSError(error.errno, error.strerror, path) from None
         raise
 
 

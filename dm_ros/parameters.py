@@ -163,8 +163,8 @@ class SymmetricParameters(Parameters):
     g_F: float = row('final_drive_ratio', 3.517, '1', -1e3, 1e3,
                      'pinion speed over carrier speed, not 0; '
                      'negative when the ring gear sits on the other side')
-    g_2s: float = row('satellite_ratio', 0.5, '1', 0.0, 1e3,
-                      'satellite radius over side gear radius', above_low=True)
+    g_2s: float = row('satellite_ratio', 0.5, '1', 1e-3, 1e3,
+                      'satellite radius over side gear radius')
     n_s: int = satellite_count(2)
     I_0: float = inertia('carrier', 0.1)
     I_1: float = inertia('left', 1.8e-4)
@@ -226,8 +226,8 @@ class SelfLockingParameters(Parameters):
 
     R_1: float = crown_radius('front', 0.040)
     R_2: float = crown_radius('rear', 0.060)
-    g_2s: float = row('satellite_ratio', 10 / 24, '1', 0.0, 1e3,
-                      'satellite radius over rear crown gear radius', above_low=True)
+    g_2s: float = row('satellite_ratio', 10 / 24, '1', 1e-3, 1e3,
+                      'satellite radius over rear crown gear radius')
     n_s: int = satellite_count(4)
     I_0: float = inertia('carrier', 2.9e-2)
     I_1: float = inertia('front', 4.8e-3)

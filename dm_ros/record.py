@@ -17,7 +17,7 @@
 
 import numpy as np
 
-from dm_ros.output_file import as_row, column_names, write_csv
+from dm_ros.output_file import as_row, column_names, replacing, write_csv
 from dm_ros.plot import save_plot
 
 
@@ -63,4 +63,5 @@ class Record:
 
     def save_plot(self, path):
         """Draw the record as PNG, which needs matplotlib."""
-        save_plot(self.columns, path, self.variant)
+        with replacing(path, 'wb') as file:
+            save_plot(self.columns, file, self.variant)

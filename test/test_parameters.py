@@ -143,7 +143,7 @@ REFUSED = [
     *[('lsd.clutch.front.radius', v, 'in (0, 10]') for v in POSITIVE],
     *[('lsd.crown_radius.rear', v, 'in (0, 10]') for v in POSITIVE],
     *[('lsd.pressure_angle', v, 'in [0, 1.5]') for v in (-0.1, 1.6, NAN)],
-    *[('lsd.satellite_ratio', v, 'in (0, 1000]') for v in POSITIVE],
+    *[('lsd.satellite_ratio', v, 'in [0.001, 1000]') for v in POSITIVE],
     *[('symmetric.final_drive_ratio', v, 'in [-1000, 1000]') for v in (1001, -INF, NAN, True)],
     ('symmetric.final_drive_ratio', 0.0, 'must not be 0'),
     *[('variant', v, 'symmetric_ode, symmetric_dae, lsd_lagged') for v in ('lsd', '', 1, None)],

@@ -1,0 +1,49 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Shared memory of DDS that processes leave behind that were killed."""
+
+import fcntl
+import os
+import re
+import time
+
+SEGMENT_LOCK = re.compile(r'fastrtps_[0-9a-f]{16}_el')
+SETTLED = 5.0   # s, younger ones may belong to a process that is just about to lock them
+
+
+def remove_leftovers(folder='/dev/shm'):
+    """
+    Remove the segments of Fast DDS that nobody owns, as ``fastdds shm clean`` does.
+
+    Fast DDS keeps the lock of a segment as long as its owner lives, and never removes that of
+    another process: half a megabyte for each that was killed.
+    """
+    try:
+        names = os.listdir(folder)
+    except OSError:   # another system keeps them elsewhere
+        return
+    for name in filter(SEGMENT_LOCK.fullmatch, names):
+        path = os.path.join(folder, name)
+        try:
+            with open(path) as file:
+                if time.time() - os.fstat(file.fileno()).st_mtime < SETTLED:
+                    continue
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                os.unlink(path.removesuffix('_el'))
+                os.unlink(path)
+        except OSError:   # somebody owns it, or is faster, or it is another user's
+            continue

@@ -1,0 +1,499 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Machines that do at random what users do to a differential, good and bad, in any order.
+
+``CoreMachine``  the core as the node uses it: ``Simulation``, ``TorqueInputs``, the tables
+``NodeMachine``  a ``DifferentialNode`` in lockstep, by its own callbacks and real publishers
+
+A sequence is one life of a machine. After each of its steps the laws of ``Laws`` hold.
+"""
+
+from contextlib import contextmanager, ExitStack
+from copy import deepcopy
+import dataclasses
+import math
+import os
+import time
+from unittest.mock import patch
+
+from hypothesis import HealthCheck, seed, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import (
+    initialize,
+    invariant,
+    precondition,
+    rule,
+    RuleBasedStateMachine,
+    run_state_machine_as_test,
+)
+import numpy as np
+from properties import constraints
+
+from dm_ros import Simulation, VARIANTS
+from dm_ros.energy import AuditedSimulation
+from dm_ros.models import MODELS
+from dm_ros.parameters import NodeParameters
+from dm_ros.progress import progress
+from dm_ros.torque_inputs import TorqueInputs
+
+ROUNDING = 1e-13   # of the largest term of a constraint, also after many changes of parameters
+SUBNORMAL = 1e-300
+STAMPS = ('none', 'none', 'none', 'next', 'next', 'same', 'old', 'far', 'below')
+KINDS = (Simulation, AuditedSimulation)   # the node runs the latter
+STEPS = 12         # in a sequence, at most
+CHUNK = 1000       # sequences from one seed
+
+finite = st.floats(-1e6, 1e6) | st.sampled_from([0.0, -0.0, 30.0, -200.0, 1e5, -1e5])
+anything = finite | st.floats() | st.sampled_from([math.nan, math.inf, -math.inf, 1e308, -1e308])
+
+
+def demands(shafts):
+    """Return demands as (names, torques): good ones, and such that must be refused."""
+    good = st.dictionaries(st.sampled_from(shafts), finite).map(
+        lambda demand: (list(demand), list(demand.values())))
+    names = st.lists(st.sampled_from([*shafts, 'wheel', '', 'satellite']), max_size=5)
+    bad = st.tuples(names, st.lists(anything, max_size=5))
+    return good | good | bad
+
+
+def as_demanded(shafts, names, torques):
+    """Return whether a demand is to be taken."""
+    return (len(names) == len(torques) == len(set(names)) and set(names) <= set(shafts)
+            and all(map(math.isfinite, torques)))
+
+
+def values(entry, default):
+    """Return values of a parameter: near its default, anywhere allowed, or impossible."""
+    if entry.kind is bool:
+        return st.booleans() | st.sampled_from([0, 'x'])
+    if entry.kind is str:
+        return st.sampled_from([*entry.choices, 'torsen'])
+    if entry.kind is int:
+        few = int(min(entry.high, max(entry.low, 10)))   # 1000 substeps would take their time
+        return (st.integers(int(entry.low), few)
+                | st.sampled_from([int(entry.low) - 1, int(entry.high) + 1, 2.5, 'x']))
+    near = st.floats(0.5, 2.0).map(lambda factor: min(default * factor, entry.high))
+    allowed = st.floats(entry.low, entry.high, exclude_min=entry.above_low)
+    impossible = st.sampled_from([math.nan, math.inf, -math.inf, entry.low - 1.0,
+                                  entry.high * 2.0 + 1.0, 1e308, '1.0'])
+    return near | near | near | allowed | impossible
+
+
+def changes(table, wanted=lambda name: True):
+    """Return changes of a table of parameters as ``{name: value}``, some of them impossible."""
+    rows = {name: entry for name, entry in table.rows().values() if wanted(name)}
+    defaults = table().named()
+    pairs = {name: st.tuples(st.just(name), values(entry, defaults[name]))
+             for name, entry in rows.items()}
+    pairs['no.such.parameter'] = st.just(('no.such.parameter', 1.0))
+    pair = st.sampled_from(list(pairs)).flatmap(pairs.get)
+    return st.lists(pair, min_size=1, max_size=3).map(dict)
+
+
+DEMANDS = {model.inputs: demands(model.inputs) for model, _ in MODELS.values()}
+TABLES = {model.parameters_type: changes(model.parameters_type) for model, _ in MODELS.values()}
+OWN = ('torque_limit', 'torque_timeout', 'power_flow_deadband', 'substeps')
+own_changes = changes(
+    NodeParameters, lambda name: name in OWN or name.startswith('initial_velocity'))
+
+
+class Laws:
+    """What holds for whatever a differential reports."""
+
+    def __init__(self, variant):
+        self.variant = variant
+        self.start_over()
+
+    def start_over(self):
+        self._offset = None   # angles from before the last change of parameters
+
+    def parameters_changed(self, position):
+        """Take the angles at which the ratios changed: from there on they follow the new ones."""
+        self._offset = position
+
+    def check(self, parameters, velocity, position, moment, power_flow):
+        """Check numbers, constraints of speeds and angles, friction and the index."""
+        assert all(map(math.isfinite, (*velocity, *position, *moment))), (
+            velocity, position, moment, parameters)
+        assert power_flow in (1, -1), power_flow
+        g = constraints(self.variant, parameters)
+        offset = self._offset or (0.0,) * len(position)
+        for terms, size in ((g * velocity, np.abs(g * velocity)),
+                            (g * np.subtract(position, offset),
+                             np.abs(g * position) + np.abs(g * offset))):
+            off = np.abs(terms.sum(axis=1))
+            assert (off <= ROUNDING * size.max(axis=1) + SUBNORMAL).all(), (
+                off, velocity, position, offset)
+        if len(moment) == 4:   # friction opposes slip; the satellite turns with the rear
+            slip = -velocity[-1]
+            assert moment[2] * slip >= 0.0 >= moment[3] * slip, (moment, slip)
+
+
+class CoreMachine(RuleBasedStateMachine):
+    """The core, used as the node uses it."""
+
+    sequences = 0   # counts, of the class
+    done = {}
+
+    def __init__(self):
+        super().__init__()
+        CoreMachine.sequences += 1
+        self.paused = False
+
+    @initialize(variant=st.sampled_from(VARIANTS), rate=st.sampled_from([50.0, 200.0, 1000.0]),
+                start=st.tuples(finite, finite), kind=st.sampled_from(KINDS))
+    def begin(self, variant, rate, start, kind):
+        self.rate = rate
+        self.settings = NodeParameters(variant=variant, rate=rate)
+        self.simulation = kind(variant, 1 / rate, initial_velocity=start)
+        self.inputs = TorqueInputs(self.simulation.inputs, self.settings.torque_limit,
+                                   self.settings.torque_timeout * rate)
+        self.laws = Laws(variant)
+        self.ticks, self.demand = 0, {}   # what they should be: {shaft: (torque, tick)}
+
+    def count(self, what):
+        self.done[what] = self.done.get(what, 0) + 1
+
+    @rule(data=st.data())
+    def demands(self, data):
+        shafts = self.simulation.inputs
+        names, torques = data.draw(DEMANDS[shafts])
+        good = as_demanded(shafts, names, torques)
+        before = (self.inputs.in_force(self.ticks), self.inputs.received, self.inputs.refused)
+        limit = self.inputs.limit
+        try:
+            clamped = self.inputs.demand(names, torques, self.ticks)
+        except ValueError:
+            assert not good
+            self.count('refused demands')
+            assert before == (self.inputs.in_force(self.ticks), self.inputs.received,
+                              self.inputs.refused - 1)
+            return
+        assert good
+        assert clamped == any(abs(torque) > limit for torque in torques)
+        self.count('demands')
+        for name, torque in zip(names, torques):
+            self.demand[name] = max(-limit, min(limit, torque)), self.ticks
+
+    @precondition(lambda self: not self.paused)
+    @rule(ticks=st.integers(1, 8))
+    def ticks_pass(self, ticks):
+        for _ in range(ticks):
+            torques = self.inputs.in_force(self.ticks)
+            timeout = self.inputs.timeout
+            assert torques == tuple(
+                0.0 if shaft not in self.demand or timeout
+                and self.demand[shaft][1] < self.ticks - timeout else self.demand[shaft][0]
+                for shaft in self.simulation.inputs)
+            before = self.simulation.snapshot()
+            try:
+                self.simulation.advance(torques)
+            except ValueError:
+                self.count('refused ticks')
+                assert repr(self.simulation.snapshot()) == repr(before)
+                continue
+            self.ticks += 1
+            self.count('ticks')
+            assert self.simulation.snapshot().torque == torques
+            self.laws_hold()
+
+    @rule(data=st.data(), substeps=st.none() | st.sampled_from([0, 1, 2, 5, 2.5]))
+    def change_of_the_mechanism(self, data, substeps):
+        changed = data.draw(TABLES[type(self.simulation.parameters)])
+        before, parameters = self.simulation.snapshot(), self.simulation.parameters
+        try:
+            prepared = self.simulation.prepare(changed, substeps)
+        except ValueError:
+            self.count('refused changes')
+            assert repr(self.simulation.snapshot()) == repr(before)
+            assert self.simulation.parameters is parameters
+            return
+        assert repr(self.simulation.snapshot()) == repr(before)
+        self.count('changes')
+        self.simulation.adopt(prepared)
+        assert self.simulation.parameters == parameters.changed(changed)
+        after = self.simulation.snapshot()
+        self.laws.parameters_changed(before.position)
+        assert after.position == before.position
+        np.testing.assert_allclose(after.velocity[1:3], before.velocity[1:3], rtol=1e-12,
+                                   atol=1e-12 * max(map(abs, before.velocity[1:3]))
+                                   + SUBNORMAL)
+
+    @rule(changed=own_changes)
+    def change_of_the_node(self, changed):
+        before = self.settings
+        try:
+            self.settings = self.settings.changed(changed)
+        except ValueError:
+            self.count('refused changes')
+            assert self.settings is before
+            return
+        self.count('changes')
+        self.inputs.limit = self.settings.torque_limit
+        self.inputs.timeout = self.settings.torque_timeout * self.rate
+        self.simulation.power_flow_deadband = self.settings.deadband
+        self.simulation.initial_velocity = self.settings.initial_velocity(
+            self.simulation.outputs)
+        if self.settings.substeps != self.simulation.substeps:
+            before = self.simulation.snapshot()
+            try:
+                self.simulation.substeps = self.settings.substeps
+            except ValueError:   # too fine for the numbers
+                self.settings = dataclasses.replace(self.settings,
+                                                    substeps=self.simulation.substeps)
+                return
+            self.laws.parameters_changed(before.position)
+
+    @rule()
+    def pause(self):
+        self.paused = not self.paused
+        self.count('pauses')
+
+    @rule()
+    def reset(self):
+        self.simulation.reset()
+        self.inputs.forget()
+        self.laws.start_over()
+        self.ticks, self.demand = 0, {}
+        self.count('resets')
+        snapshot = self.simulation.snapshot()
+        assert (snapshot.time, snapshot.power_flow) == (0.0, 1)
+        assert not any((*snapshot.position, *snapshot.torque))
+
+    @invariant()
+    def laws_hold(self):
+        if not hasattr(self, 'simulation'):
+            return
+        snapshot = self.simulation.snapshot()
+        assert self.simulation.ticks == self.ticks
+        if isinstance(self.simulation, AuditedSimulation):
+            assert math.isfinite(self.simulation.stored_energy)
+            assert all(map(math.isfinite, self.simulation.total.work))
+        assert snapshot.time == self.ticks * self.simulation.dt
+        self.laws.check(self.simulation.parameters, *snapshot[1:3], *snapshot[4:])
+
+
+class NodeMachine(RuleBasedStateMachine):
+    """A node in lockstep, by its callbacks; ``nodes`` must be there while it runs."""
+
+    sequences = 0
+    done = {}
+    nodes = {}   # one for each variant, used by one sequence after the other
+
+    def __init__(self):
+        super().__init__()
+        NodeMachine.sequences += 1
+
+    @initialize(variant=st.sampled_from(VARIANTS))
+    def begin(self, variant):
+        self.node, self.heard, self.defaults = self.nodes[variant]
+        self.node.control.running.set()
+        self.heard.clear()   # a sequence may be broken off
+        self.laws = Laws(variant)
+        self.last_stamp = self.ticks = 0
+        assert all(result.successful for result in self.request(self.defaults))
+        self.reset()
+
+    def count(self, what):
+        self.done[what] = self.done.get(what, 0) + 1
+
+    def request(self, changed):
+        from rcl_interfaces.srv import SetParameters
+        from rclpy.parameter import Parameter
+        return self.node._parameter_services._set_parameters_callback(
+            SetParameters.Request(parameters=[
+                Parameter(name, value=value).to_parameter_msg()
+                for name, value in changed.items()]), SetParameters.Response()).results
+
+    def in_force(self):
+        """Return all that a refused request must not touch."""
+        simulation, inputs = self.node.simulation, self.node._inputs
+        return (simulation.parameters, simulation.substeps, simulation.power_flow_deadband,
+                simulation.initial_velocity, inputs.limit, repr(simulation.snapshot()),
+                {name: self.node.get_parameter(name).value for name in self.defaults})
+
+    @precondition(lambda self: self.node.control.running.is_set())
+    @rule(data=st.data(), stamp=st.sampled_from(STAMPS),
+          times=st.integers(1, 4))
+    def torques(self, data, stamp, times):
+        from builtin_interfaces.msg import Time
+        from sensor_msgs.msg import JointState
+        shafts = self.node.simulation.inputs
+        names, torques = data.draw(DEMANDS[shafts])
+        for _ in range(times):
+            stamp_now = {'none': 0, 'next': self.last_stamp + 1, 'same': self.last_stamp,
+                         'old': self.last_stamp // 2, 'far': self.last_stamp + 10**17,
+                         'below': -10**9}[stamp]
+            stamp_now = min(stamp_now, (2**31 - 1) * 10**9)
+            message = JointState(name=names, effort=torques)
+            message.header.stamp = Time(sec=stamp_now // 10**9, nanosec=stamp_now % 10**9)
+            good = as_demanded(shafts, names, torques) and (
+                stamp_now == 0 or stamp_now > self.last_stamp)
+            before = self.node._inputs.received, self.node._inputs.refused, self.in_force()[-2]
+            refused_ticks = self.node._diagnostics.out_of_range.count
+            with self.node.control.lock:
+                self.node._lockstep_tick(message)
+            received, refused = self.node._inputs.received, self.node._inputs.refused
+            assert (received - before[0], refused - before[1]) == ((1, 0) if good else (0, 1))
+            if not good:
+                self.count('refused messages')
+                assert not self.heard and self.in_force()[-2] == before[-1]
+                continue
+            self.last_stamp = stamp_now or self.last_stamp
+            self.a_tick_was_made(refused_ticks)
+
+    def a_tick_was_made(self, refused_ticks):
+        refused = self.node._diagnostics.out_of_range.count - refused_ticks
+        assert refused in (0, 1)
+        self.ticks += not refused
+        self.count('refused ticks' if refused else 'ticks')
+        assert len(self.heard) == 3
+        self.laws_hold()
+
+    @rule(data=st.data())
+    def parameters_of_the_mechanism(self, data):
+        self.parameters_of(data.draw(TABLES[type(self.node.simulation.parameters)]))
+
+    @rule(changed=own_changes | changes(NodeParameters))
+    def parameters_of(self, changed):
+        before, position = self.in_force(), self.node.simulation.snapshot().position
+        results = self.request(changed)
+        successes = {result.successful for result in results}
+        assert len(results) == len(changed) and len(successes) == 1
+        if successes == {False}:
+            self.count('refused requests')
+            assert all(result.reason for result in results)
+            assert repr(self.in_force()) == repr(before)
+            return
+        self.count('requests')
+        simulation = self.node.simulation
+        if simulation.parameters != before[0] or simulation.substeps != before[1]:
+            self.laws.parameters_changed(position)
+        for name, value in changed.items():
+            assert self.node.get_parameter(name).value == value
+            if name in simulation.parameters.named():
+                assert simulation.parameters.named()[name] == value
+
+    @rule(wanted=st.sampled_from([False, False, True]))
+    def pause(self, wanted):
+        from std_srvs.srv import SetBool
+        response = self.node._pause(SetBool.Request(data=wanted), SetBool.Response())
+        assert response.success and self.node.control.running.is_set() != wanted
+        self.count('pauses')
+
+    @rule()
+    def step(self):
+        from std_srvs.srv import Trigger
+        refused_ticks = self.node._diagnostics.out_of_range.count
+        response = self.node._step(Trigger.Request(), Trigger.Response())
+        assert response.success != self.node.control.running.is_set()
+        if response.success:
+            self.a_tick_was_made(refused_ticks)
+
+    @rule()
+    def reset(self):
+        from std_srvs.srv import Trigger
+        assert self.node._reset(Trigger.Request(), Trigger.Response()).success
+        self.count('resets')
+        self.laws.start_over()
+        self.last_stamp = self.ticks = 0
+        assert not any((*self.node.simulation.snapshot().position,
+                        *self.node._inputs.in_force(0)))
+
+    @rule()
+    def diagnose(self):
+        self.node._diagnose()
+
+    @invariant()
+    def laws_hold(self):
+        """Check all that was published since the last time."""
+        if not hasattr(self, 'node'):
+            return
+        simulation = self.node.simulation
+        assert simulation.ticks == self.ticks
+        assert simulation.time == self.ticks * simulation.dt
+        assert len(self.heard) % 3 == 0
+        while self.heard:
+            joints, moments, flow = [self.heard.pop(0) for _ in range(3)]
+            assert joints.header.stamp == moments.header.stamp
+            stamp = joints.header.stamp.sec * 10**9 + joints.header.stamp.nanosec
+            assert stamp == round(simulation.ticks * simulation.dt * 1e9)
+            assert all(map(math.isfinite, joints.effort))
+            self.laws.check(simulation.parameters, joints.velocity, joints.position,
+                            moments.effort, flow.data)
+
+
+class Heard:
+    """A publisher that also keeps what it publishes."""
+
+    def __init__(self, publisher, messages):
+        self._publisher, self._messages = publisher, messages
+
+    def publish(self, message):
+        self._messages.append(deepcopy(message))
+        self._publisher.publish(message)
+
+
+@contextmanager
+def nodes():
+    """Have a node of each variant, in a domain of their own."""
+    import rclpy
+    from rclpy.logging import LoggingSeverity
+    from rclpy.parameter import Parameter
+
+    from dm_ros.domain import own_domain
+    from dm_ros.node import DifferentialNode
+    with own_domain() as domain, ExitStack() as stack:
+        stack.enter_context(
+            patch.dict(os.environ, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST'))
+        context = rclpy.Context()
+        rclpy.init(context=context, domain_id=domain)
+        stack.callback(rclpy.shutdown, context=context)
+        for variant in VARIANTS:
+            node = DifferentialNode(context=context, parameter_overrides=[
+                Parameter('variant', value=variant), Parameter('mode', value='lockstep')],
+                cli_args=['--ros-args', '-r', f'__node:={variant}'])
+            stack.callback(node.close)
+            node.get_logger().set_level(LoggingSeverity.FATAL)   # it has much to complain about
+            messages = []
+            for publisher in ('_joint_states', '_internal_moments', '_power_flow'):
+                setattr(node, publisher, Heard(getattr(node, publisher), messages))
+            tables = (NodeParameters(), node.simulation.parameters)
+            defaults = {name: value for table in tables for name, value in table.named().items()
+                        if node.has_parameter(name)
+                        and not node.describe_parameter(name).read_only}
+            NodeMachine.nodes[variant] = node, messages, defaults
+        yield
+        NodeMachine.nodes.clear()
+
+
+def run(machine, sequences, first=0):
+    """
+    Run a machine so often, print and return its count of sequences.
+
+    Each thousand has its own seed, from ``first`` on: equal runs are equal to the last draw.
+    """
+    machine.sequences, machine.done = 0, {}
+    begin = time.monotonic()
+    for n in progress(range(0, sequences, CHUNK), total=-(-sequences // CHUNK), unit='thousand'):
+        run_state_machine_as_test(seed(first + n)(machine), settings=settings(
+            max_examples=min(CHUNK, sequences - n), stateful_step_count=STEPS, deadline=None,
+            database=None, suppress_health_check=list(HealthCheck)))
+    done = ', '.join(f'{count} {what}' for what, count in sorted(machine.done.items()))
+    print(f'\n{machine.__name__}: {machine.sequences} sequences in '
+          f'{time.monotonic() - begin:.0f} s: {done}')
+    return machine.sequences
