@@ -59,7 +59,7 @@ run: setup  ## run the demo: VARIANT, DURATION in s, RATE in Hz, OUT a folder
 
 test: setup  ## run the tests: PYTEST_ARGS
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \
-	  .venv/bin/python -m pytest $(PYTEST_ARGS)
+	  .venv/bin/python -m pytest -n auto $(PYTEST_ARGS)
 
 compare: setup  ## compare all variants as the paper does, on a page in comparison/: COMPARE_ARGS
 	.venv/bin/compare_variants $(COMPARE_ARGS)

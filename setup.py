@@ -42,7 +42,7 @@ setup(
         'physics': ['mujoco>=4'],
         'plot': [MATPLOTLIB],
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
-        'test': ['hypothesis', 'pytest', MATPLOTLIB],
+        'test': ['hypothesis', 'pytest', 'pytest-xdist', MATPLOTLIB],
     },
     entry_points={
         'console_scripts': [
