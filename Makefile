@@ -65,7 +65,8 @@ compare: setup  ## compare all variants as the paper does, on a page in comparis
 	.venv/bin/compare_variants $(COMPARE_ARGS)
 
 test-long: setup  ## run the long tests: random parameters by the 100,000, a day of simulated time
-	.venv/bin/python -m pytest -s test/long $(PYTEST_ARGS)
+	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \
+	  .venv/bin/python -m pytest -s test/long $(PYTEST_ARGS)
 
 bench: .venv-bench/done  ## measure what a step costs, beside other tools, and how exact it is: BENCH_ARGS
 	env -u PYTHONPATH .venv-bench/bin/python bench/step.py $(BENCH_ARGS)

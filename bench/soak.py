@@ -60,7 +60,7 @@ def soak(arguments, folder):
     parameters = ['--ros-args', '-p', f'variant:={arguments.variant}', '-p',
                   f'rate:={arguments.rate!r}']
     with Recorder('/differential', arguments.variant) as recorder, \
-            process('node', *parameters) as node, \
+            process('differential', *parameters) as node, \
             process('play_torques', '--variant', arguments.variant) as player:
         wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft', node, player)
         idle = subprocess.Popen([

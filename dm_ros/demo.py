@@ -103,7 +103,7 @@ def record(arguments):
     parameters = ['--ros-args', '-r', f'__ns:={namespace}', '-p', f'variant:={arguments.variant}',
                   '-p', f'rate:={arguments.rate!r}']
     with Recorder(f'{namespace}/differential', arguments.variant) as recorder:
-        with process('node', *parameters) as node:
+        with process('differential', *parameters) as node:
             wait(recorder.poll, 'state of the differential', node)
             with process('play_torques', '--variant', arguments.variant,
                          '--node', f'{namespace}/differential') as player:
