@@ -276,8 +276,9 @@ def test_an_interrupted_run_leaves_nothing_behind(folder, number):
     (folder / 'IN.csv').write_text(GOOD.replace('\n1,', '\n1e6,'))
     (folder / 'OUT.csv').write_text('precious')
     before = set(folder.iterdir())
-    process = subprocess.Popen([*TOOL, '--torques', 'IN.csv', '--out', 'OUT.csv'],
-                               stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(   # a shell's background job, as a test run may be, ignores SIGINT
+        [*TOOL, '--torques', 'IN.csv', '--out', 'OUT.csv'], stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     try:
         end = time.monotonic() + 60.0
         while not any(path.suffix == '.part' for path in folder.iterdir()):
