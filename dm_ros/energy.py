@@ -38,7 +38,7 @@ from typing import NamedTuple
 
 from dm_ros.loss_meters import AT_REST, METERS
 from dm_ros.models import MODELS
-from dm_ros.simulation import Simulation
+from dm_ros.simulation import Simulation, Snapshot
 
 NO_LOSS = 1e-12   # of the energy turned over in a tick: less than that, given back, is rounding
 
@@ -130,6 +130,10 @@ class MeteredModel:
         return result
 
 
+class AuditedSnapshot(Snapshot):
+    """A ``Snapshot`` with ``energy``, the books of its tick, and ``stored_energy``, both in J."""
+
+
 class AuditedSimulation(Simulation):
     """
     A ``Simulation`` that keeps the books of its energy.
@@ -195,6 +199,12 @@ class AuditedSimulation(Simulation):
             if tick[i] < -NO_LOSS * scale:
                 self._returned_ticks[i - 5] += 1
                 self._returned[i - 5] -= tick[i]
+
+    def snapshot(self):
+        """Return the ``AuditedSnapshot`` of the last tick, or of the start at zero torque."""
+        snapshot = AuditedSnapshot(*super().snapshot())
+        snapshot.energy, snapshot.stored_energy = self.tick, self.stored_energy
+        return snapshot
 
     @property
     def stored_energy(self):
