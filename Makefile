@@ -93,7 +93,7 @@ colcon: .venv/colcon  ## build the package with colcon, check what it installs, 
 	  --params-file install/dm_ros/share/dm_ros/config/lsd.yaml
 
 test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's numpy and scipy
-	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest --ignore=test/ros $(PYTEST_ARGS)
+	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest -n auto --ignore=test/ros $(PYTEST_ARGS)
 
 clean:  ## remove all that the other targets make
 	rm -rf .venv .venv-* build install log run comparison *.egg-info .hypothesis .pytest_cache .ruff_cache

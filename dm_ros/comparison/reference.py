@@ -21,10 +21,9 @@ The power-flow index is decided at the start of each tick, from the yardstick's 
 
 from math import tanh
 from typing import NamedTuple
-import warnings
 
 import numpy as np
-from scipy.integrate import odeint, ODEintWarning
+from scipy.integrate import odeint
 
 from dm_ros import self_locking
 from dm_ros.power_flow import DIRECT, power_flow, REVERSE
@@ -145,28 +144,26 @@ def exact_self_locking(p, torques, dt, start=(0.0, 0.0), deadband=0.0, tick=lamb
     M_1, M_2 = frozen or (0.0, 0.0)
     direction = DIRECT
     states, moments, index = [], [], []
-    with warnings.catch_warnings():
-        warnings.simplefilter('error', ODEintWarning)
-        for T in torques:
-            direction = power_flow(
-                T[0] * w, T[1] * (w + a_1 * s) + T[2] * (w - a_2 * s), deadband, direction)
-            if frozen:
-                friction = (0.0, 0.0), (phi[0] * abs(M_1) + preload[0],
-                                        phi[1] * abs(M_2) + preload[1])
-            slope = motion.slope(T, direction, friction)
+    for T in torques:
+        direction = power_flow(
+            T[0] * w, T[1] * (w + a_1 * s) + T[2] * (w - a_2 * s), deadband, direction)
+        if frozen:
+            friction = (0.0, 0.0), (phi[0] * abs(M_1) + preload[0],
+                                    phi[1] * abs(M_2) + preload[1])
+        slope = motion.slope(T, direction, friction)
 
-            def f(t, y, slope=slope):
-                return slope(float(y[0]), float(y[1]))[:2]
+        def f(t, y, slope=slope):
+            return slope(float(y[0]), float(y[1]))[:2]
 
-            try:
-                w, s = odeint(f, (w, s), (0.0, dt), tfirst=True, rtol=TOLERANCE, atol=TOLERANCE,
-                              mxstep=100_000)[-1].tolist()
-            except ODEintWarning:
-                raise ValueError('lsd: LSODA finds no exact solution to compare with, after '
-                                 f'{len(index) * dt:g} s') from None
-            _, _, M_1, M_2, F_1, F_2 = slope(w, s)
-            states.append((w, w + a_1 * s, w - a_2 * s))
-            moments.append((direction * M_1, direction * M_2, F_1, F_2))
-            index.append(direction)
-            tick()
+        y, info = odeint(f, (w, s), (0.0, dt), tfirst=True, rtol=TOLERANCE, atol=TOLERANCE,
+                         mxstep=100_000, full_output=True)
+        if info['message'] != 'Integration successful.':
+            raise ValueError('lsd: LSODA finds no exact solution to compare with, after '
+                             f'{len(index) * dt:g} s')
+        w, s = y[-1].tolist()
+        _, _, M_1, M_2, F_1, F_2 = slope(w, s)
+        states.append((w, w + a_1 * s, w - a_2 * s))
+        moments.append((direction * M_1, direction * M_2, F_1, F_2))
+        index.append(direction)
+        tick()
     return Exact(np.array(states), np.array(moments), np.array(index))
