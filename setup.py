@@ -1,22 +1,10 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 from glob import glob
 from xml.etree import ElementTree
 
-from setuptools import setup
+from setuptools import find_packages, setup
 
 PACKAGE = ElementTree.parse('package.xml').getroot()
 NAME = PACKAGE.findtext('name')
@@ -29,7 +17,7 @@ setup(
     maintainer=PACKAGE.findtext('maintainer'),
     maintainer_email=PACKAGE.find('maintainer').get('email'),
     license=PACKAGE.findtext('license'),
-    packages=[NAME, f'{NAME}.comparison'],
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -46,13 +34,13 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'bias = dm_ros.bias:main',
-            'compare_variants = dm_ros.compare_variants:main',
-            'demo = dm_ros.demo:main',
-            'differential = dm_ros.differential:main',
-            'play_torques = dm_ros.play_torques:main',
-            'simulate = dm_ros.simulate:main',
+            'bias = dm_ros.tools.bias:main',
+            'compare_variants = dm_ros.tools.compare_variants:main',
+            'demo = dm_ros.tools.demo:main',
+            'differential = dm_ros.ros.command:main',
+            'play_torques = dm_ros.tools.play_torques:main',
+            'simulate = dm_ros.tools.simulate:main',
         ],
-        'pytest11': ['dm_ros = dm_ros.pytest_plugin'],
+        'pytest11': ['dm_ros = dm_ros.testing.pytest_plugin'],
     },
 )

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """
 The benchmark of the loop: does the node hold its rate, beside a loop in C on the same machine.
@@ -101,7 +89,7 @@ def cpu_seconds():
 
 def watched_pacer(rate, timeline):
     """Return a ``Pacer`` that notes each tick."""
-    from dm_ros.pacing import Pacer
+    from dm_ros.motion.pacing import Pacer
 
     class WatchedPacer(Pacer):
         def begin(self, now):
@@ -112,7 +100,7 @@ def watched_pacer(rate, timeline):
 
 def python_loop(rate, seconds, path):
     """Run the node's loop with nothing to do."""
-    from dm_ros.loops import Control, follow_steady_clock
+    from dm_ros.ros.loops import Control, follow_steady_clock
     control, timeline = Control(), Timeline(path)
     end = time.monotonic() + seconds
 
@@ -129,7 +117,7 @@ def node(rate, variant, path):
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.parameter import Parameter
 
-    from dm_ros.node import DifferentialNode, SWITCH_INTERVAL
+    from dm_ros.ros.node import DifferentialNode, SWITCH_INTERVAL
     rclpy.init()
     differential = DifferentialNode(parameter_overrides=[
         Parameter('variant', value=variant), Parameter('rate', value=float(rate))])
@@ -186,7 +174,7 @@ def round_trips(shaft, index, path):
     from sensor_msgs.msg import JointState
     from std_msgs.msg import Float64
 
-    from dm_ros.messages import never_called, poll, Polled
+    from dm_ros.ros.messages import never_called, poll, Polled
     rclpy.init()
     me = rclpy.create_node('round_trips')
     states = me.create_subscription(JointState, '/differential/joint_states', never_called, 100,
@@ -320,7 +308,7 @@ def main():
         ROLES[sys.argv[1]](*sys.argv[2:])
         return
     arguments = parser().parse_args()
-    from dm_ros.domain import own_domain
+    from dm_ros.ros.domain import own_domain
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     print(f'{date.today()}, {platform.machine()}, {os.cpu_count()} cores, {platform.system()}, '
           f'Python {platform.python_version()}, {arguments.variant}, {arguments.duration:g} s for '

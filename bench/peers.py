@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """
 Other tools that step the same mechanism: scipy, MuJoCo, python-control.
@@ -27,11 +15,11 @@ import numpy as np
 from reference import slip_shares, three_shafts
 from scipy.integrate import solve_ivp
 
-from dm_ros.comparison.reference import ClutchMotion
-from dm_ros.parameters import SymmetricParameters
-from dm_ros.power_flow import DIRECT, power_flow, REVERSE
-from dm_ros.steppers import held_torque_propagator
-from dm_ros.symmetric import kinematics, SymmetricOde
+from dm_ros.mechanism.parameters import SymmetricParameters
+from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE
+from dm_ros.mechanism.symmetric import kinematics, SymmetricOde
+from dm_ros.motion.steppers import held_torque_propagator
+from dm_ros.tools.comparison.reference import ClutchMotion
 
 try:
     import mujoco

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """
 The soak: does the node stay what it is, hour after hour, with all its topics alive.
@@ -32,9 +20,9 @@ import time
 
 import numpy as np
 
-from dm_ros.demo import process, wait
-from dm_ros.domain import own_domain
-from dm_ros.recorder import Recorder
+from dm_ros.ros.domain import own_domain
+from dm_ros.ros.recorder import Recorder
+from dm_ros.tools.demo import process, wait
 
 LOOK = 5.0        # s between two looks
 DROP = 0.005      # of the rate, beyond that of the loop with no work
@@ -60,8 +48,8 @@ def soak(arguments, folder):
     parameters = ['--ros-args', '-p', f'variant:={arguments.variant}', '-p',
                   f'rate:={arguments.rate!r}']
     with Recorder('/differential', arguments.variant) as recorder, \
-            process('differential', *parameters) as node, \
-            process('play_torques', '--variant', arguments.variant) as player:
+            process('ros.command', *parameters) as node, \
+            process('tools.play_torques', '--variant', arguments.variant) as player:
         wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft', node, player)
         idle = subprocess.Popen([
             sys.executable, str(Path(__file__).with_name('loop.py')), 'python_loop',

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """
 The benchmark: what a step costs, beside other tools, and how exact it is.
@@ -34,9 +22,9 @@ from peers import AllHinges, Control, lossless, MatrixPair, SolveIvp, TwoHinges,
 from reference import clutch_trajectory, largest_error, symmetric_trajectory, trajectory_of
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters
-from dm_ros.models import VARIANTS
-from dm_ros.progress import progress
-from dm_ros.scenarios import profile
+from dm_ros.mechanism.loads import profile
+from dm_ros.motion.models import VARIANTS
+from dm_ros.tools.progress import progress
 
 DT = 1e-3            # s, of the cost table
 SLOW_PASSES = 3      # of the rows with solve_ivp

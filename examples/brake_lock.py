@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """
 A brake-based differential lock: a car on a hill with its left wheel on ice, in three cases.
@@ -32,8 +20,8 @@ from typing import NamedTuple
 from car import BrakeLock, Car, CarParameters, with_wheels_and_engine
 import numpy as np
 
-from dm_ros.parameters import SymmetricParameters
-from dm_ros.record import Record
+from dm_ros.files.record import Record
+from dm_ros.mechanism.parameters import SymmetricParameters
 from dm_ros.testing import DirectDifferential, LockstepDifferential
 
 RATE = 1000.0   # Hz

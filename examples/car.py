@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """
 A car on a hill with one wheel on ice, and the brake-based lock of its differential.
@@ -24,7 +12,7 @@ front-driven middle-class car in first gear.
 from dataclasses import dataclass
 import math
 
-from dm_ros.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
 
 ASPHALT, ICE = 0.95, 0.12   # greatest friction coefficients of a tyre
 GRAVITY = 9.81              # m/s^2
@@ -57,7 +45,7 @@ def with_wheels_and_engine(variant, p):
     """
     Return the mechanism parameters with wheels and engine attached to their shafts.
 
-    This is what keeps the exchange of torques stable, see docs/coupling.md.
+    This is what keeps the exchange of torques stable, see doc/coupling.md.
     """
     if variant.startswith('symmetric'):
         gear = SymmetricParameters()

@@ -1,20 +1,8 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """
-Measures where the exchange of torques becomes unstable; prints the tables of docs/coupling.md.
+Measures where the exchange of torques becomes unstable; prints the tables of doc/coupling.md.
 
 A differential stands with its output shafts against a load that is a function of their speeds,
 as a tyre is, and gets a small push. Torques are exchanged once a tick. The push dies out or it
@@ -28,7 +16,7 @@ from car import CarParameters, with_wheels_and_engine
 import numpy as np
 
 from dm_ros import Simulation
-from dm_ros.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
 from dm_ros.testing import DirectDifferential
 
 GEAR = SymmetricParameters()
@@ -155,7 +143,7 @@ def late_formula(rate, inertia, ticks):
 
 
 def tables():
-    """Yield the lines of the tables of docs/coupling.md."""
+    """Yield the lines of the tables of doc/coupling.md."""
     yield from ('| rate, Hz | wheel inertia in the shaft, kg m^2 | 2 I/dt, N m s/rad | measured |',
                 '|---|---|---|---|')
     for rate in (200.0, 1000.0, 5000.0):

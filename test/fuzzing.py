@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """
 Machines that do at random what users do to a differential, good and bad, in any order.
@@ -45,10 +33,10 @@ from properties import constraints
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.energy import AuditedSimulation
-from dm_ros.models import MODELS
-from dm_ros.parameters import NodeParameters
-from dm_ros.progress import progress
-from dm_ros.torque_inputs import TorqueInputs
+from dm_ros.motion.held_inputs import TorqueInputs
+from dm_ros.motion.models import MODELS
+from dm_ros.settings import NodeParameters
+from dm_ros.tools.progress import progress
 
 ROUNDING = 1e-13   # of the largest term of a constraint, also after many changes of parameters
 SUBNORMAL = 1e-300
@@ -455,8 +443,8 @@ def nodes():
     from rclpy.logging import LoggingSeverity
     from rclpy.parameter import Parameter
 
-    from dm_ros.domain import own_domain
-    from dm_ros.node import DifferentialNode
+    from dm_ros.ros.domain import own_domain
+    from dm_ros.ros.node import DifferentialNode
     with own_domain() as domain, ExitStack() as stack:
         stack.enter_context(
             patch.dict(os.environ, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST'))

@@ -1,18 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
-
 
 """
 What a differential keeps to whatever is asked of it, checked shortly and, in ``long``, at length.
@@ -28,17 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dm_ros import (
-    self_locking,
-    SelfLockingParameters,
-    Simulation,
-    symmetric,
-    SymmetricParameters,
-    VARIANTS,
-)
-from dm_ros.models import MODELS
-from dm_ros.self_locking import SelfLockingDae
-from dm_ros.symmetric import SymmetricDae
+from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
+from dm_ros.mechanism import self_locking, symmetric
+from dm_ros.mechanism.self_locking import SelfLockingDae
+from dm_ros.mechanism.symmetric import SymmetricDae
+from dm_ros.motion.models import MODELS
 
 ROUNDING = 1e-14     # of the largest term of a constraint
 TORQUE_LIMIT = 1e5   # N m

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The limits of the torque split are those at which the simulated shafts begin to slip."""
 
@@ -24,8 +12,9 @@ import numpy as np
 import pytest
 
 from dm_ros import SelfLockingParameters, Simulation
-from dm_ros.bias import friction_for, main, torque_bias
-from dm_ros.self_locking import slip_steepness
+from dm_ros.bias import friction_for, torque_bias
+from dm_ros.mechanism.self_locking import slip_steepness
+from dm_ros.tools.bias import main
 
 
 def without_drag(p):
@@ -134,7 +123,7 @@ def test_70_and_85_percent_need_stronger_clutches_than_those_of_table_2_and_are_
     friction = friction_for(p, 0.70, 0.85)
     assert friction.admissible
     f = friction.front / math.tan(p.alpha), friction.rear / math.tan(p.alpha)
-    assert f == pytest.approx((1.607, 1.484), abs=5e-4)   # docs/bias.md
+    assert f == pytest.approx((1.607, 1.484), abs=5e-4)   # doc/bias.md
     assert p.f == pytest.approx((0.15, 1.35))
     assert [x_k / own for x_k, own in zip(f, p.f)] == pytest.approx((10.7, 1.10), rel=5e-3)
     stronger = with_friction(p, friction)   # is not refused
@@ -158,7 +147,7 @@ def test_the_docs_give_the_limits_of_table_2(torque):
             shares = sorted(100 * split.share[side] for split in
                             torque_bias(SelfLockingParameters(), torque, direction))
             cells.append('{:.1f} % to {:.1f} %'.format(*shares))
-    text = (Path(__file__).parents[1] / 'docs' / 'bias.md').read_text()
+    text = (Path(__file__).parents[1] / 'doc' / 'bias.md').read_text()
     assert '| ' + ' | '.join(cells) + ' |' in text
 
 
@@ -199,7 +188,7 @@ def test_command_says_the_limits_in_two_lines(capsys):
         'and 35.0 % to 74.2 % to the rear',
         'this parameter set can send 29.6 % to 58.3 % of a large torque to the front '
         'and 41.7 % to 70.4 % to the rear']
-    text = (Path(__file__).parents[1] / 'docs' / 'bias.md').read_text()
+    text = (Path(__file__).parents[1] / 'doc' / 'bias.md').read_text()
     for line in out.splitlines():
         assert f'    {line}\n' in text
 

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The tool ``compare_variants``: its page, the paper's claims on short runs, and bad input."""
 
@@ -22,16 +10,17 @@ import os
 import numpy as np
 import pytest
 
-from dm_ros import compare_variants, VARIANTS
-from dm_ros.comparison import measures as measures
-from dm_ros.comparison import page as comparison_page
-from dm_ros.comparison.claims import SILENT
-from dm_ros.comparison.figures import FIGURES
-from dm_ros.comparison.reference import exact_self_locking, exact_symmetric
-from dm_ros.comparison.runs import Load, MECHANISMS, RATES, run, ticks_of, variants_of
-from dm_ros.parameters import SelfLockingParameters, SymmetricParameters
-from dm_ros.self_locking import balance, SelfLockingDae, SelfLockingOde
-from dm_ros.symmetric import SymmetricDae
+from dm_ros import VARIANTS
+from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.self_locking import balance, SelfLockingDae, SelfLockingOde
+from dm_ros.mechanism.symmetric import SymmetricDae
+from dm_ros.tools import compare_variants
+from dm_ros.tools.comparison import measures as measures
+from dm_ros.tools.comparison import page as comparison_page
+from dm_ros.tools.comparison.claims import SILENT
+from dm_ros.tools.comparison.figures import FIGURES
+from dm_ros.tools.comparison.reference import exact_self_locking, exact_symmetric
+from dm_ros.tools.comparison.runs import Load, MECHANISMS, RATES, run, ticks_of, variants_of
 
 
 @pytest.fixture(autouse=True)
@@ -108,7 +97,7 @@ def test_page_is_complete_and_shows_every_picture_that_lies_beside_it(capsys):
 
 
 def test_all_but_the_timings_is_the_same_in_each_run(monkeypatch):
-    monkeypatch.setattr('dm_ros.comparison.runs.perf_counter', iter(range(10**6)).__next__)
+    monkeypatch.setattr('dm_ros.tools.comparison.runs.perf_counter', iter(range(10**6)).__next__)
     for out in 'ab':
         assert compare('--mechanism', 'symmetric', '--out', out) == 0
     assert page_in('a') == page_in('b')

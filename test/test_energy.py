@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The energy that the torques bring is stored or lost, and the books say where."""
 
@@ -39,10 +27,10 @@ from scipy.optimize import brentq
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
 from dm_ros.energy import AuditedSimulation, Energy, rated_efficiency
-from dm_ros.models import MODELS
-from dm_ros.scenarios import profile
-from dm_ros.self_locking import full_friction, slip_steepness
-from dm_ros.steppers import ClutchStep
+from dm_ros.mechanism.loads import profile
+from dm_ros.mechanism.self_locking import full_friction, slip_steepness
+from dm_ros.motion.models import MODELS
+from dm_ros.motion.steppers import ClutchStep
 
 LSD = VARIANTS[2:]
 EACH_VARIANT = pytest.mark.parametrize('variant', VARIANTS)
@@ -429,7 +417,7 @@ def test_energy_comes_back_where_the_side_that_the_index_names_takes_power(varia
                        else tick.work[1] + tick.work[2])
             ticks[int(driving < 0.0)] += 1
             back[int(driving < 0.0)] -= lost
-    assert ticks.sum() > 2500 and ticks[1] / ticks.sum() > 0.98   # docs/energy.md
+    assert ticks.sum() > 2500 and ticks[1] / ticks.sum() > 0.98   # doc/energy.md
     assert back[1] / back.sum() > 0.999
 
 
@@ -438,7 +426,7 @@ def test_the_docs_say_how_often_and_how_much_energy_comes_back(variant):
     audit = AuditedSimulation(variant)
     for torque in loads(variant):
         audit.advance(torque)
-    text = (Path(__file__).parents[1] / 'docs' / 'energy.md').read_text()
+    text = (Path(__file__).parents[1] / 'doc' / 'energy.md').read_text()
     table = text.split(f'| `{variant}` | net loss')[1].split('\n\n')[0]
     net = dict(zip(audit.returned, audit.total.gears + audit.total.bearings, strict=True))
     for name, (ticks, energy) in audit.returned.items():

@@ -1,19 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
-"""The worked example without topics, and the stability limit of docs/coupling.md."""
+"""The worked example without topics, and the stability limit of doc/coupling.md."""
 
 from pathlib import Path
 import re
@@ -30,11 +18,11 @@ from dm_ros.testing import DirectDifferential
 
 ROOT = Path(__file__).parents[1]
 OPEN, BRAKE, LSD = brake_lock.CASES
-PAGE = (ROOT / 'docs' / 'coupling.md').read_text()
+PAGE = (ROOT / 'doc' / 'coupling.md').read_text()
 
 
 def table_after(heading):
-    """Return the rows of the first table of docs/coupling.md whose head begins so, as words."""
+    """Return the rows of the first table of doc/coupling.md whose head begins so, as words."""
     rows = PAGE.split(heading, 1)[1].split('\n\n', 1)[0].splitlines()[2:]
     return [[cell.strip() for cell in row.strip('|').split('|')] for row in rows]
 
@@ -155,6 +143,6 @@ def test_the_car_of_the_example_is_within_its_limit_and_chatters_beyond():
 
 
 def test_every_file_that_the_pages_link_is_there():
-    for page in ('docs/coupling.md', 'docs/lockstep.md', 'docs/testing.md', 'examples/README.md'):
+    for page in ('doc/coupling.md', 'doc/lockstep.md', 'doc/testing.md', 'examples/README.md'):
         for link in re.findall(r'\]\(([^)#:]+)\)', (ROOT / page).read_text()):
             assert (ROOT / page).parent.joinpath(link).exists(), f'{page}: {link}'

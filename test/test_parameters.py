@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """Parameters are those of the paper, and no impossible one is let in."""
 
@@ -24,8 +12,8 @@ import numpy as np
 import pytest
 
 from dm_ros import SelfLockingParameters, SymmetricParameters
-from dm_ros.parameters import NodeParameters
-from dm_ros.self_locking import full_friction, SelfLockingOde
+from dm_ros.mechanism.self_locking import full_friction, SelfLockingOde
+from dm_ros.settings import NodeParameters
 
 TABLE_1 = {
     'symmetric.final_drive_ratio': 3.517,

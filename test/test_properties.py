@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """Whatever is asked of a differential, it keeps to its laws; at length in ``long``."""
 
@@ -26,8 +14,8 @@ from properties import DT, endure, PERIOD, random_case, Tally
 import pytest
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
-from dm_ros.power_flow import DIRECT, REVERSE
-from dm_ros.symmetric import SymmetricOde
+from dm_ros.mechanism.power_flow import DIRECT, REVERSE
+from dm_ros.mechanism.symmetric import SymmetricOde
 
 ROOT = Path(__file__).parents[1]
 EACH_VARIANT = pytest.mark.parametrize('variant', VARIANTS)
@@ -142,7 +130,7 @@ def table_rows(text):
 
 
 def test_the_page_on_the_power_flow_index_prints_what_it_says():
-    page = (ROOT / 'docs' / 'power-flow.md').read_text()
+    page = (ROOT / 'doc' / 'power-flow.md').read_text()
     code, = re.findall(r'```python\n(.*?)```', page, re.DOTALL)
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):

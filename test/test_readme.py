@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """What the README says is what the code does: tables, versions, commands."""
 
@@ -23,7 +11,8 @@ import pytest
 import yaml
 
 from dm_ros import Simulation, VARIANTS
-from dm_ros.parameters import NodeParameters, SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.settings import NodeParameters
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / 'README.md').read_text()
@@ -72,7 +61,7 @@ def test_the_changelog_begins_with_the_version_of_the_package():
 
 
 PAGES = [ROOT / 'README.md', ROOT / 'examples' / 'README.md',
-         *sorted((ROOT / 'docs').glob('*.md'))]
+         *sorted((ROOT / 'doc').glob('*.md'))]
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: f'{page.parent.name}-{page.stem}')
@@ -83,12 +72,12 @@ def test_every_file_that_is_linked_is_there(page):
 
 
 def test_the_readme_links_to_every_page():
-    for page in (ROOT / 'docs').glob('*.md'):
-        assert f'](docs/{page.name})' in README, page.name
+    for page in (ROOT / 'doc').glob('*.md'):
+        assert f'](doc/{page.name})' in README, page.name
 
 
 def test_every_test_that_the_physics_page_names_is_there():
-    names = re.findall(r'`(test_\w+)`', (ROOT / 'docs' / 'physics.md').read_text())
+    names = re.findall(r'`(test_\w+)`', (ROOT / 'doc' / 'physics.md').read_text())
     tests = ''.join(path.read_text() for path in (ROOT / 'test').glob('test_*.py'))
     assert len(names) > 5
     for name in names:
@@ -105,8 +94,9 @@ def test_every_dependency_of_setup_has_its_rosdep_key():
     root = ElementTree.parse(ROOT / 'package.xml').getroot()
     keys = {e.text for e in root if e.tag.endswith('depend')}
     imported = set()
-    for source in (ROOT / 'dm_ros').glob('*.py'):
+    for source in (ROOT / 'dm_ros').rglob('*.py'):
         imported |= set(re.findall(r'^ *(?:import|from) (\w+)', source.read_text(), re.MULTILINE))
+    assert {'rclpy', 'numpy', 'sensor_msgs', 'tqdm'} <= imported
     of_rosdep = {'numpy': 'python3-numpy', 'scipy': 'python3-scipy', 'yaml': 'python3-yaml',
                  'tqdm': 'python3-tqdm', 'matplotlib': 'python3-matplotlib'}
     for module in imported:

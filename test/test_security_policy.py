@@ -1,18 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
-
 
 """The SROS2 policy grants the node what it uses and nothing more; files and messages are data."""
 
@@ -65,8 +52,8 @@ def test_the_policy_grants_what_the_node_uses_and_nothing_more(monkeypatch):
     rclpy = pytest.importorskip('rclpy')
     from rclpy.parameter import Parameter
 
-    from dm_ros.domain import own_domain
-    from dm_ros.node import DifferentialNode
+    from dm_ros.ros.domain import own_domain
+    from dm_ros.ros.node import DifferentialNode
 
     used = {'publish': set(), 'subscribe': set(), 'reply': set(), 'request': set()}
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
@@ -131,10 +118,10 @@ def test_what_make_starts_stays_on_this_host():
     """The demo, the fixtures and the tests set the range themselves or get it from make."""
     assert re.search(r'^test:.*\n(\t.*\n)*\t.*ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST',
                      (ROOT / 'Makefile').read_text(), re.MULTILINE)
-    for name in ('dm_ros/demo.py', 'dm_ros/testing.py', 'test/ros/conftest.py'):
+    for name in ('dm_ros/tools/demo.py', 'dm_ros/testing/lockstep.py', 'test/ros/conftest.py'):
         text = (ROOT / name).read_text()
         assert re.search(r"ROS_AUTOMATIC_DISCOVERY_RANGE'(\] = |, )'LOCALHOST'", text), name
     # whoever else starts ROS in this repository says so too
     for path, tree in sources():
-        if path.parent != ROOT / 'dm_ros' and 'rclpy.init' in calls(tree):
+        if ROOT / 'dm_ros' not in path.parents and 'rclpy.init' in calls(tree):
             assert 'LOCALHOST' in path.read_text(), path

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The three formulations of the self-locking differential are the equations of its elements."""
 
@@ -33,10 +21,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from dm_ros import self_locking, SelfLockingParameters
-from dm_ros.models import SelfLockingModel
-from dm_ros.self_locking import SelfLockingDae, SelfLockingLagged, SelfLockingOde, solve_moments
-from dm_ros.steppers import ClutchStep
+from dm_ros import SelfLockingParameters
+from dm_ros.mechanism import self_locking
+from dm_ros.mechanism.self_locking import (
+    SelfLockingDae,
+    SelfLockingLagged,
+    SelfLockingOde,
+    solve_moments,
+)
+from dm_ros.motion.models import SelfLockingModel
+from dm_ros.motion.steppers import ClutchStep
 
 FORMULATIONS = [SelfLockingLagged, SelfLockingOde, SelfLockingDae]
 IDENTITY = 1e-12   # relative: rounding

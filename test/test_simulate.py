@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The tool ``simulate``: its files, its numbers, and how it refuses bad input."""
 
@@ -26,12 +14,12 @@ import numpy as np
 import pytest
 
 from dm_ros import Simulation, VARIANTS
-from dm_ros.scenarios import profile
-from dm_ros.simulate import main
-from dm_ros.torque_table import read_torque_file, TorqueTable
+from dm_ros.files.torque_table import read_torque_file, TorqueTable
+from dm_ros.mechanism.loads import profile
+from dm_ros.tools.simulate import main
 
 GOOD = 'time,pinion,left,right\n0,10,-15,-16\n0.5,-10,15,16\n1,0,0,0\n'
-TOOL = [sys.executable, '-m', 'dm_ros.simulate', '--variant', 'symmetric_ode']
+TOOL = [sys.executable, '-m', 'dm_ros.tools.simulate', '--variant', 'symmetric_ode']
 
 
 @pytest.fixture(autouse=True)
@@ -330,7 +318,7 @@ def test_argparse_errors_have_the_exit_code_2(capsys):
 
 
 def test_the_tool_loads_neither_ros_nor_matplotlib():
-    check = ('import sys, dm_ros.simulate; '
+    check = ('import sys, dm_ros.tools.simulate; '
              'assert not {"rclpy", "matplotlib"} & set(sys.modules), sys.modules')
     subprocess.run([sys.executable, '-c', check], check=True)
 

@@ -1,31 +1,14 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """A simulation is the mechanism in time: its interface, its identities and its refusals."""
 
 import math
-import os
-from pathlib import Path
-import subprocess
-import sys
 
 from mechanisms import random_self_locking, random_symmetric, self_locking_speeds, symmetric_speeds
 import numpy as np
 import pytest
 
-import dm_ros
 from dm_ros import SelfLockingParameters, Simulation, Snapshot, SymmetricParameters, VARIANTS
 
 LSD = VARIANTS[2:]
@@ -405,16 +388,3 @@ def test_locked_clutch_comes_to_rest_and_does_not_chatter(variant, rate):
         slips.append(abs(front - rear))
     assert slips == sorted(slips, reverse=True)
     assert slips[0] < 1e-6
-
-
-def test_library_does_not_import_ros():
-    modules = ('parameters', 'symmetric', 'self_locking', 'power_flow', 'steppers', 'models',
-               'simulation')
-    code = (f'import sys, dm_ros, {", ".join(f"dm_ros.{m}" for m in modules)}\n'
-            'dm_ros.Simulation("lsd_ode").step((1, 2, 3))\n'
-            'print(*sorted(sys.modules))')
-    path = os.pathsep.join([str(Path(dm_ros.__file__).parents[1]), *filter(None, sys.path)])
-    loaded = subprocess.run([sys.executable, '-c', code], env={**os.environ, 'PYTHONPATH': path},
-                            capture_output=True, text=True, check=True).stdout.split()
-    assert 'dm_ros.simulation' in loaded
-    assert not [m for m in loaded if m.startswith(('rclpy', 'rcl_', 'std_msgs', 'sensor_msgs'))]

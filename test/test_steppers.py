@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The fixed-step integrators are right beside exact and adaptive solutions."""
 
@@ -22,9 +10,12 @@ from scipy.integrate import odeint, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from dm_ros import self_locking, SelfLockingParameters, Simulation, steppers
-from dm_ros.self_locking import SelfLockingOde
-from dm_ros.steppers import (
+from dm_ros import SelfLockingParameters, Simulation
+from dm_ros.mechanism import self_locking
+from dm_ros.mechanism.self_locking import SelfLockingOde
+from dm_ros.mechanism.symmetric import SymmetricOde
+from dm_ros.motion import steppers
+from dm_ros.motion.steppers import (
     apply_phi_2,
     backward_euler,
     ClutchStep,
@@ -33,7 +24,6 @@ from dm_ros.steppers import (
     phi_2,
     rosenbrock_part,
 )
-from dm_ros.symmetric import SymmetricOde
 
 
 def clutch_step(p=None, **tolerance):

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The two formulations of the symmetric differential are the equations of its elements."""
 
@@ -31,8 +19,9 @@ from mechanisms import (
 import numpy as np
 import pytest
 
-from dm_ros import symmetric, SymmetricParameters
-from dm_ros.symmetric import SymmetricDae, SymmetricOde
+from dm_ros import SymmetricParameters
+from dm_ros.mechanism import symmetric
+from dm_ros.mechanism.symmetric import SymmetricDae, SymmetricOde
 
 FORMULATIONS = [SymmetricOde, SymmetricDae]
 IDENTITY = 1e-12   # relative: rounding

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The demo: two processes over DDS, recorded, reported, drawn."""
 
@@ -22,13 +10,13 @@ import sys
 
 import pytest
 
-from dm_ros.output_file import column_names
-from dm_ros.simulation import Simulation
+from dm_ros.files.output import column_names
+from dm_ros.motion.simulation import Simulation
 
 
 def demo(folder, *arguments):
     return subprocess.run(
-        [sys.executable, '-m', 'dm_ros.demo', '--out', str(folder), '--duration', '1.5',
+        [sys.executable, '-m', 'dm_ros.tools.demo', '--out', str(folder), '--duration', '1.5',
          *arguments],
         capture_output=True, text=True, timeout=90)
 
@@ -62,7 +50,7 @@ def test_a_bad_variant_or_an_unwritable_folder_ends_it_with_one_line(tmp_path):
 
 
 def test_runs_beside_each_other_do_not_hear_each_other(tmp_path):
-    command = [sys.executable, '-m', 'dm_ros.demo', '--duration', '1.5', '--rate', '50']
+    command = [sys.executable, '-m', 'dm_ros.tools.demo', '--duration', '1.5', '--rate', '50']
     runs = [subprocess.Popen([*command, '--variant', variant, '--out', str(tmp_path / variant)],
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                              env=os.environ)

@@ -1,19 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
-"""What docs/lockstep.md claims beside what test_lockstep.py and test_clocks.py show."""
+"""What doc/lockstep.md claims beside what test_lockstep.py and test_clocks.py show."""
 
 from pathlib import Path
 import re
@@ -25,7 +13,7 @@ from sensor_msgs.msg import JointState
 from dm_ros import Simulation, VARIANTS
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / 'docs' / 'lockstep.md').read_text()
+PAGE = (ROOT / 'doc' / 'lockstep.md').read_text()
 
 
 def torque(effort, shaft='carrier'):

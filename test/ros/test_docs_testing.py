@@ -1,19 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
-"""The code blocks of docs/testing.md are test files that pass."""
+"""The code blocks of doc/testing.md are test files that pass."""
 
 from pathlib import Path
 import re
@@ -22,7 +10,7 @@ pytest_plugins = ['pytester']
 
 ROOT = Path(__file__).parents[2]
 BLOCKS = re.findall(r'^```python\n# (\w+)\.py\n(.*?)^```', (
-    ROOT / 'docs' / 'testing.md').read_text(), re.MULTILINE | re.DOTALL)
+    ROOT / 'doc' / 'testing.md').read_text(), re.MULTILINE | re.DOTALL)
 
 
 def test_the_blocks_of_the_page_run(pytester):

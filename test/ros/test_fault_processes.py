@@ -1,18 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
-
 
 """Faults around the processes: signals, kills, floods, missing rights, full disks."""
 
@@ -32,15 +19,15 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from sensor_msgs.msg import JointState
 
-from dm_ros.record import Record
+from dm_ros.files.record import Record
 from dm_ros.testing import DirectDifferential
 
 ROOT = Path(__file__).parents[2]
-NODE = [sys.executable, '-m', 'dm_ros.differential']
+NODE = [sys.executable, '-m', 'dm_ros.ros.command']
 # as the command does, and it tells when a signal no longer is the interpreter's affair
 TELLING_NODE = [sys.executable, '-c', """
 import signal, sys
-from dm_ros.differential import main
+from dm_ros.ros.command import main
 set_handler, told = signal.signal, []
 def tell(number, handler):
     set_handler(number, handler)
@@ -271,9 +258,9 @@ def test_where_it_cannot_write_its_log_it_ends_with_one_line(start):
 
 TORQUES = 'time,pinion,left,right\n0,10,-15,-16\n5,0,0,0\n'
 WRITERS = {   # what writes, and what it says when the disk is full, with the exit code
-    'simulate, CSV': ("from dm_ros.simulate import main; sys.exit(main(['--variant', "
+    'simulate, CSV': ("from dm_ros.tools.simulate import main; sys.exit(main(['--variant', "
                       "'symmetric_ode', '--torques', 'in.csv', '--out', 'out/result']))", 2),
-    'simulate, picture': ("from dm_ros.simulate import main; sys.exit(main(['--variant', "
+    'simulate, picture': ("from dm_ros.tools.simulate import main; sys.exit(main(['--variant', "
                           "'symmetric_ode', '--torques', 'in.csv', '--plot', 'out/result']))", 2),
     'demo, CSV': ('from test_demo_on_a_full_disk import run; run(10000)', 1),
     'demo, picture': ('from test_demo_on_a_full_disk import run; run(10)', 1),
@@ -281,8 +268,9 @@ WRITERS = {   # what writes, and what it says when the disk is full, with the ex
 DEMO = """
 import sys, types
 import numpy
-from dm_ros import Simulation, demo
-from dm_ros.output_file import column_names
+from dm_ros import Simulation
+from dm_ros.tools import demo
+from dm_ros.files.output import column_names
 
 def run(rows):
     names = column_names(Simulation('symmetric_ode'))

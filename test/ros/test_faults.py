@@ -1,18 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
-
 
 """Faults on the topics, the services and the clocks of a node in this process."""
 
@@ -35,9 +22,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-from dm_ros import loops
-from dm_ros.loops import Control, follow_steady_clock
-from dm_ros.pacing import Pacer
+from dm_ros.motion.pacing import Pacer
+from dm_ros.ros import loops
+from dm_ros.ros.loops import Control, follow_steady_clock
 
 ROOT = Path(__file__).parents[2]
 TORQUES, JOINTS = '/differential/torques', '/differential/joint_states'
@@ -383,7 +370,7 @@ def test_real_time_is_paced_by_a_clock_that_nobody_can_set(ros, monkeypatch):
 
 
 def test_every_test_that_the_table_of_faults_names_exists():
-    page = (ROOT / 'docs' / 'faults.md').read_text()
+    page = (ROOT / 'doc' / 'faults.md').read_text()
     named = set(re.findall(r'`(test_\w+)`', page))
     there = {node.name for path in (ROOT / 'test').rglob('test_*.py')
              for node in ast.walk(ast.parse(path.read_text()))

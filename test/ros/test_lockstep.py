@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """Lockstep: a message is a tick and an answer, to the last bit."""
 
@@ -195,7 +183,7 @@ def test_the_lockstep_run_is_the_direct_run_to_the_last_bit_under_load(variant):
 
 
 def test_a_run_ends_to_the_tick_and_says_so_when_nobody_answers(monkeypatch):
-    monkeypatch.setattr('dm_ros.testing.PATIENCE', 1.0)
+    monkeypatch.setattr('dm_ros.testing.lockstep.PATIENCE', 1.0)
     with LockstepDifferential('lsd_ode', 1000.0) as vehicle:
         with pytest.raises(TimeoutError, match='nobody publishes'):
             vehicle.run(seconds=1.0)
@@ -220,7 +208,7 @@ def test_a_run_ends_at_its_condition_and_goes_on():
 
 def test_a_stopped_and_continued_process_misses_no_tick(ros):
     process = subprocess.Popen(
-        [sys.executable, '-m', 'dm_ros.node', '--ros-args', '-p', 'mode:=lockstep', '-p',
+        [sys.executable, '-m', 'dm_ros.ros.node', '--ros-args', '-p', 'mode:=lockstep', '-p',
          'variant:=lsd_ode', '-p', 'rate:=1000.0'], env=os.environ)
     joints = ros.listen(JointState, '/differential/joint_states', depth=5000)
     publisher = ros.node.create_publisher(JointState, '/differential/torques', 5000)

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The node ``differential`` over real topics, in a domain of its own."""
 
@@ -35,7 +23,8 @@ from std_msgs.msg import Float64, Int8
 from std_srvs.srv import SetBool, Trigger
 
 from dm_ros import Simulation, VARIANTS
-from dm_ros.parameters import NodeParameters, SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.settings import NodeParameters
 
 CONFIG = Path(__file__).parents[2] / 'config'
 

@@ -1,17 +1,5 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
 
 """The node as a process: how it starts, what it refuses, how it ends."""
 
@@ -28,7 +16,7 @@ CONFIG = Path(__file__).parents[2] / 'config'
 
 
 def start(*arguments):
-    command = [sys.executable, '-m', 'dm_ros.node', *arguments]
+    command = [sys.executable, '-m', 'dm_ros.ros.node', *arguments]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                             env=os.environ)
 

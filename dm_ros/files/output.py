@@ -1,0 +1,58 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the tools write: the columns of a record, and files that are whole or not there."""
+
+from contextlib import contextmanager
+import os
+
+
+def column_names(simulation):
+    """Return the names of the columns of a record, as in OUT.csv."""
+    return ['time', *(f'velocity.{name}' for name in simulation.shafts),
+            *(f'position.{name}' for name in simulation.shafts),
+            *(f'torque.{name}' for name in simulation.inputs),
+            *(f'moment.{name}' for name in simulation.moments), 'power_flow']
+
+
+def as_row(snapshot):
+    """Return a ``Snapshot`` as one flat tuple in the order of ``column_names``."""
+    time, velocity, position, torque, moment, power_flow = snapshot
+    return (time, *velocity, *position, *torque, *moment, power_flow)
+
+
+@contextmanager
+def replacing(path, mode):
+    """
+    Open a file that takes the place of ``path`` in the end, but only if all went well.
+
+    What is no ordinary file, such as /dev/stdout or a pipe, is written to as it is.
+    """
+    path = os.fspath(path)
+    if path.startswith('/dev/') or os.path.exists(path) and not os.path.isfile(path):
+        with open(path, mode) as file:
+            yield file
+        return
+    folder, name = os.path.split(os.path.realpath(path))
+    unfinished = os.path.join(folder, f'.{name}.{os.getpid()}.part')
+    try:
+        file = open(unfinished, mode)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, path) from None
+    try:
+        with file:
+            yield file
+        os.replace(unfinished, os.path.join(folder, name))
+    except BaseException as error:
+        os.unlink(unfinished)
+        if isinstance(error, OSError) and error.filename is None:   # as on a full disk
+            raise OSError(error.errno, error.strerror, path) from None
+        raise
+
+
+def write_csv(columns, path):
+    """Write ``{name: array}`` as CSV, 17 significant digits."""
+    with replacing(path, 'w') as file:
+        file.write(','.join(columns) + '\n')
+        for row in zip(*(values.tolist() for values in columns.values())):
+            file.write(','.join(f'{value:.17g}' for value in row) + '\n')

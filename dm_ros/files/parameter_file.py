@@ -1,0 +1,215 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Parameter files as ROS 2 reads them, without ROS, and the text of the default files.
+
+ROS 2 has its own notion of a YAML parameter file: ``1e-3`` is a double (to PyYAML it is a
+string), ``5`` is no double, a name may be nested or dotted. This reader sees what a node
+``/differential`` would see, and refuses what the node would refuse.
+"""
+
+import re
+import textwrap
+
+import yaml
+
+from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.settings import NodeParameters
+
+NODE = '/differential'
+TABLES = (SymmetricParameters, SelfLockingParameters, NodeParameters)
+TYPE_NAMES = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
+              list: 'a list'}
+# what every ROS 2 node takes beside its own parameters
+ROS_PARAMETERS = re.compile(r'use_sim_time|start_type_description_service|qos_overrides\..+')
+
+BOOLS = {**dict.fromkeys('y Y yes Yes YES true True TRUE on On ON'.split(), True),
+         **dict.fromkeys('n N no No NO false False FALSE off Off OFF'.split(), False)}
+INTEGER = re.compile(r'[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)')
+DOUBLE = re.compile(r'[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?')
+NOT_FINITE = re.compile(r'[-+]?\.?(inf|infinity|nan)', re.IGNORECASE)
+
+
+def read_parameter_file(path):
+    """
+    Return the parameters that a file gives to a node ``/differential``.
+
+    :return: ``{full name: value}``, only those in the file.
+    :raises ValueError: one line, ``file: name: what``, for a file that cannot be read, an
+        unknown name, a value that is not allowed, or values that make an impossible mechanism.
+    """
+    try:
+        values = {}
+        for name_of_node, parameters in _sections(_documents(path)):
+            if _is_for_node(name_of_node):
+                values.update(_flat(parameters))
+        for table in TABLES:
+            mine = table.part_of(values)
+            for name, row in table.rows().values():
+                if name in mine:
+                    _check_type(name, mine[name], row.kind)
+            table().changed(mine)
+        _check_other_names(values)
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from None
+    return values
+
+
+def _documents(path):
+    """Return the root nodes of a YAML file; nothing is constructed from them."""
+    try:
+        with open(path, encoding='utf-8') as file:
+            text = file.read()
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            if isinstance(event, yaml.AliasEvent):   # few of them can stand for billions
+                raise ValueError(f'line {event.start_mark.line + 1}: '
+                                 f'ROS 2 knows no YAML aliases such as *{event.anchor}')
+        return [root for root in yaml.compose_all(text, Loader=yaml.SafeLoader) if root]
+    except OSError as error:
+        raise ValueError(error.strerror) from None
+    except UnicodeDecodeError:
+        raise ValueError('not a text file in UTF-8') from None
+    except yaml.MarkedYAMLError as error:
+        raise ValueError(f'line {error.problem_mark.line + 1}: not YAML: '
+                         f'{" ".join(error.problem.split())}') from None
+    except yaml.YAMLError as error:
+        raise ValueError(f'not YAML: {" ".join(str(error).split())}') from None
+    except RecursionError:
+        raise ValueError('nested too deeply') from None
+
+
+def _sections(roots, above=''):
+    """Yield (name of a node, its ros__parameters) in the order of the file."""
+    for root in roots:
+        if not isinstance(root, yaml.MappingNode):
+            raise ValueError(f'{above or "the file"}: there is no ros__parameters, a parameter '
+                             'file has sections such as "/**: ros__parameters:"')
+        for key, value in root.value:
+            if key.value == 'ros__parameters':
+                if not above:
+                    raise ValueError('ros__parameters: it must be below a node, such as "/**:"')
+                yield above, value
+            else:
+                yield from _sections([value], f'{above}/{key.value}'.replace('//', '/'))
+
+
+def _is_for_node(section):
+    """Return whether ROS 2 applies a section to ``NODE``: ** is any namespaces, * is one."""
+    words = {'**': r'(/\w+)*', '*': r'/\w+'}
+    pattern = ''.join(words.get(token, '/' + re.escape(token))
+                      for token in section.split('/') if token)
+    return re.fullmatch(pattern, NODE) is not None
+
+
+def _flat(parameters, above=''):
+    """Return ``{dotted name: value}`` of a mapping with nested and dotted names alike."""
+    if not isinstance(parameters, yaml.MappingNode):
+        raise ValueError(f'{above or "ros__parameters"}: '
+                         'names with values are expected below it')
+    flat = {}
+    for key, node in parameters.value:
+        name = f'{above}.{key.value}' if above else str(key.value)
+        if isinstance(node, yaml.MappingNode):
+            below = _flat(node, name)
+        elif isinstance(node, yaml.SequenceNode):
+            below = {name: [element.value for element in node.value]}
+        else:
+            below = {name: _scalar(name, node)}
+        for twice in flat.keys() & below.keys():
+            raise ValueError(f'{twice}: given twice, also in line {key.start_mark.line + 1}')
+        flat.update(below)
+    return flat
+
+
+def _scalar(name, node):
+    """Return the value of a scalar with the type that ROS 2 gives it."""
+    text = node.value
+    if node.style:   # quoted
+        return text
+    if not text:
+        raise ValueError(f'{name}: there is no value')
+    if text in BOOLS:
+        return BOOLS[text]
+    if INTEGER.fullmatch(text):
+        digits = text.lstrip('+-')
+        base = 16 if digits[:2] in ('0x', '0X') else 8 if digits[0] == '0' else 10
+        value = int(text, base)
+        return value if -2**63 <= value < 2**63 else float(value)
+    if DOUBLE.fullmatch(text):
+        return float(text)
+    if NOT_FINITE.fullmatch(text):
+        return float(text.replace('.', ''))
+    return text
+
+
+def _check_type(name, value, kind):
+    """Refuse a value of another type than the parameter's: ROS 2 converts none."""
+    if type(value) is kind:
+        return
+    hint = f', write {value}.0' if (type(value), kind) == (int, float) else ''
+    raise ValueError(f'{name}: {value!r} is {TYPE_NAMES[type(value)]}, '
+                     f'it must be {TYPE_NAMES[kind]}{hint}')
+
+
+def _check_other_names(values):
+    known = {name for table in TABLES for name, _ in table.rows().values()}
+    for name, value in values.items():
+        if name not in known and not ROS_PARAMETERS.fullmatch(name):
+            raise ValueError(f'{name}: there is no such parameter')
+        if name in ('use_sim_time', 'start_type_description_service'):
+            _check_type(name, value, bool)
+
+
+WIDTH = 100   # of a line
+HEADER = """\
+# The defaults of the {title}, {source} of the paper.
+#
+# A ROS 2 parameter file: copy it, change values or leave them out, and hand it over with
+#   ros2 run dm_ros differential --ros-args -p variant:={variant} --params-file FILE
+#   ros2 run dm_ros simulate --variant {variant} --params FILE --torques IN.csv
+# A double needs its decimal point: 5.0, not 5. Comments: symbol, unit, meaning.
+/**:
+  ros__parameters:
+"""
+TITLES = {
+    SymmetricParameters: {'title': 'symmetric differential', 'source': 'Table 1',
+                          'variant': 'symmetric_ode'},
+    SelfLockingParameters: {'title': 'self-locking differential', 'source': 'Table 2',
+                            'variant': 'lsd_ode'},
+}
+
+
+def default_text(table):
+    """Return the text of the parameter file with the defaults of a mechanism."""
+    tree = {}
+    for symbol, (name, row) in table.rows().items():
+        *groups, leaf = name.split('.')
+        branch = tree
+        for group in groups:
+            branch = branch.setdefault(group, {})
+        unit = '' if row.unit == '1' else f', {row.unit}'
+        branch[leaf] = _number(getattr(table(), symbol)), f'{symbol}{unit}: {row.description}'
+    return HEADER.format(**TITLES[table]) + ''.join(_lines(tree, '    '))
+
+
+def _lines(tree, indent):
+    for name, entry in tree.items():
+        if isinstance(entry, dict):
+            yield f'{indent}{name}:\n'
+            yield from _lines(entry, indent + '  ')
+            continue
+        value, comment = entry
+        line = f'{indent}{name}: {value}'
+        if len(f'{line}  # {comment}') <= WIDTH:
+            yield f'{line}  # {comment}\n'
+        else:
+            mark = f'{indent}# '
+            yield textwrap.fill(comment, WIDTH, initial_indent=mark, subsequent_indent=mark)
+            yield f'\n{line}\n'
+
+
+def _number(value):
+    """Return a number as text that both ROS 2 and YAML 1.1 read alike: 4.0e-05, not 4e-05."""
+    text = repr(value)
+    return text.replace('e', '.0e') if 'e' in text and '.' not in text else text

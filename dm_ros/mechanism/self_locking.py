@@ -1,0 +1,290 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The equations of the asymmetric self-locking differential (section 4 of the paper).
+
+Three formulations of one mechanism, each for direct and reverse power flow:
+
+``SelfLockingLagged``  variant 1: moments eliminated, 2x2, the friction from the |M| of the
+                       preceding step, (61)-(70)
+``SelfLockingOde``     variant 2: (e_1, e_2, M_1, M_2) at once, 4x4, (71)-(77)
+``SelfLockingDae``     variant 3: (e_0, e_1, e_2, e_s, M_1, M_2) with constraints, 6x6,
+                       (78)-(88)
+
+Symbols and signs are those of the paper, the order of the elements is (0, 1, 2, s): carrier,
+front, rear, satellite. ``T`` is (T_0, T_1, T_2); a torque is positive when it accelerates its
+shaft. Where a printed equation contradicts the others, the corrected form stands here, marked
+"erratum", and a test shows that the printed one fails.
+
+The clutch friction depends on the speeds through the slip omega_1 - omega_2 alone, so the
+motion is written in the carrier speed and the slip, y = (omega_0, omega_1 - omega_2). Under
+held torques each formulation is linear but for the clutch moments F = (F_1, F_2):
+
+    dy/dt = A y + B T - C F
+    M     = P y + Q T - W F        M = (M_1, M_2), in the sign of the paper
+    F_k   = f_k (tan(alpha) |M_k| + n_s N_k R_k),    f_k ~ tanh(c_fk (omega_k - omega_0))
+
+``LinearResponse`` holds these matrices; ``solve_moments`` takes the last two lines exactly.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from dm_ros.mechanism.power_flow import DIRECT
+
+SHAFTS = ('carrier', 'front', 'rear', 'satellite')
+MOMENTS = ('front_mesh', 'rear_mesh', 'front_clutch', 'rear_clutch')
+
+
+class LinearResponse(NamedTuple):
+    """Accelerations and gear moments, linear in speeds, torques and clutch moments."""
+
+    A: np.ndarray   # (2, 2)
+    B: np.ndarray   # (2, 3)
+    C: np.ndarray   # (2, 2)
+    P: np.ndarray   # (2, 2)
+    Q: np.ndarray   # (2, 3)
+    W: np.ndarray   # (2, 2)
+
+
+def kinematics(p):
+    """Return g_D, (4, 2): the speeds of all elements are g_D (omega_1, omega_2), (53)-(54)."""
+    g = 1 + p.g_12
+    return np.array([
+        [1 / g, p.g_12 / g],
+        [1.0, 0.0],
+        [0.0, 1.0],
+        [-1 / (p.g_2s * g), 1 / (p.g_2s * g)]])
+
+
+def slip_coordinates(p):
+    """Return S, (2, 2): y = (omega_0, omega_1 - omega_2) is S (omega_1, omega_2)."""
+    return np.array([kinematics(p)[0], [1, -1]])
+
+
+def viscosities(p):
+    """Return diag(l_0, l_1, l_2, l_s), (65), (86)."""
+    return np.diag([p.l_0, p.l_1, p.l_2, p.l_s])
+
+
+def slip_steepness(p):
+    """Return (a_1, a_2), s/rad: f_k grows with tanh(a_k (omega_1 - omega_2)), (58)."""
+    return p.c_f1 * p.g_12 / (1 + p.g_12), -p.c_f2 / (1 + p.g_12)
+
+
+def full_friction(p):
+    """Return tan(alpha) f_k and the preload friction f_k n_s N_k R_k at full slip, (56)."""
+    (f_1, f_2), tan = p.f, math.tan(p.alpha)
+    return (f_1 * tan, f_2 * tan), (f_1 * p.n_s * p.N_1 * p.R_1, f_2 * p.n_s * p.N_2 * p.R_2)
+
+
+def solve_moments(z, W, x):
+    """
+    Solve M = z - W diag(x) |M| for the gear moments.
+
+    For each of the four sign patterns of M the system is linear; for admissible parameters
+    exactly one pattern agrees with its own solution, and it is found by looking, not by
+    iteration.
+
+    :param z: gear moments without the proportional friction, (2,), N m.
+    :param W: influence of the clutch moments on the gear moments, (2, 2).
+    :param x: signed proportional friction factors tan(alpha) f_k, (2,).
+    :return: ``(M_1, M_2)``, N m.
+    """
+    (W_11, W_12), (W_21, W_22) = W
+    best = None
+    for sign_1 in (1.0, -1.0):
+        for sign_2 in (1.0, -1.0):
+            # (I + W diag(x sign)) M = z
+            a, b = 1 + W_11 * x[0] * sign_1, W_12 * x[1] * sign_2
+            c, d = W_21 * x[0] * sign_1, 1 + W_22 * x[1] * sign_2
+            det = a * d - b * c
+            M_1, M_2 = (d * z[0] - b * z[1]) / det, (a * z[1] - c * z[0]) / det
+            wrong = max(0.0, -M_1 * sign_1, -M_2 * sign_2)
+            if best is None or wrong < best[0]:
+                best = wrong, M_1, M_2
+    # where M_k is zero up to rounding two patterns meet, and the less wrong one stands
+    return best[1:]
+
+
+def balance(p, direction):
+    """
+    Return I_D (2, 2), eta_T (2, 3), eta_L (2, 4), eta_F (2, 2): (61)-(63) direct, (69) reverse.
+
+    The total and the relative balance of the mechanism, from which the gear moments are
+    eliminated: I_D e_D = eta_T T - eta_L L - eta_F F.
+    """
+    g, n = p.g_12, p.n_s / p.g_2s
+    satellite = p.I_s * n / (p.g_2s * (1 + g))
+    if direction == DIRECT:
+        eta_1L, eta_2L = 1 / p.eta_1G - 1, 1 / p.eta_2G - 1
+        I_D = np.array([
+            [p.I_0 / (1 + g) + p.I_1 / (p.eta_1G * p.eta_0B),
+             p.I_0 * g / (1 + g) + p.I_2 / (p.eta_2G * p.eta_0B)],
+            [-(p.I_1 * g / p.eta_1G + satellite), p.I_2 / p.eta_2G + satellite]])
+        eta_t = np.array([
+            [1, 1 / (p.eta_1G * p.eta_0B), 1 / (p.eta_2G * p.eta_0B)],
+            [0, -g / p.eta_1G, 1 / p.eta_2G]])
+        relative = [-g / p.eta_1G, 1 / p.eta_2G]
+    else:
+        eta_1L, eta_2L = p.eta_1G * p.eta_0B - 1, p.eta_2G * p.eta_0B - 1
+        I_D = np.array([
+            [p.I_0 / (1 + g) + p.I_1 * p.eta_1G, p.I_0 * g / (1 + g) + p.I_2 * p.eta_2G],
+            [-(p.I_1 * p.eta_1G * g + satellite), p.I_2 * p.eta_2G + satellite]])
+        eta_t = np.array([
+            [1 / p.eta_0B, p.eta_1G, p.eta_2G],
+            [0, -g * p.eta_1G, p.eta_2G]])
+        relative = [-g * p.eta_1G, p.eta_2G]
+    eta_l = np.array([
+        [1 / p.eta_0B, eta_1L / p.eta_0B, eta_2L / p.eta_0B, 0],
+        [0, *relative, n]])
+    eta_f = np.array([
+        [eta_1L / p.eta_0B, eta_2L / p.eta_0B],
+        relative])
+    return I_D, eta_t, eta_l, eta_f
+
+
+def viscous(p):
+    """Return the matrix (4, 2) that gives L = l (omega - omega_H) from omega_D, (54), (65)."""
+    g_D = kinematics(p)   # erratum (54): omega = g_D omega_D
+    # erratum (54): the carrier supports both crown gears
+    return viscosities(p) @ (g_D - np.outer([0, 1, 1, 0], g_D[0]))
+
+
+class SelfLockingLagged:
+    """
+    Variant 1: two equations in omega_1, omega_2; |M| in the friction is that of the last step.
+
+    The system is linear in the accelerations; M is recovered from them, (68), (70).
+    """
+
+    lagged = True
+
+    def __init__(self, parameters):
+        self.p = parameters
+
+    def response(self, direction):
+        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
+        p = self.p
+        I_D, eta_t, eta_l, eta_f = balance(p, direction)
+        L = viscous(p)
+        A, B, C = (np.linalg.solve(I_D, m) for m in (-eta_l @ L, eta_t, eta_f))     # (67)
+        I_G, T_G, E = np.diag([p.I_1, p.I_2]), np.eye(2, 3, k=1), np.eye(2)
+        P, Q, W = I_G @ A + L[1:3], I_G @ B - T_G, I_G @ C - E
+        eta_G = np.diag([p.eta_1G, p.eta_2G]) if direction == DIRECT else -E
+        P, Q, W = (np.linalg.solve(eta_G, m) for m in (P, Q, W))                  # (68), (70)
+        S = slip_coordinates(p)
+        S_inverse = np.linalg.inv(S)
+        return LinearResponse(S @ A @ S_inverse, S @ B, S @ C, P @ S_inverse, Q, W)
+
+
+class SelfLockingOde:
+    """Variant 2: accelerations and gear moments at once, nonlinear in the signs of M."""
+
+    lagged = False
+
+    def __init__(self, parameters):
+        self.p = parameters
+
+    def system(self, direction):
+        """
+        Return G_D (4, 4), eta_T (4, 3), eta_L (4, 4), eta_F (4, 2): (72)-(73), (76)-(77).
+
+        They make G_D x + eta_F F + eta_L L - eta_T T = 0 with x = (e_1, e_2, M_1, M_2), (75).
+        """
+        p = self.p
+        I_D, eta_t, eta_l, eta_f = balance(p, direction)
+        eta_M = -np.diag([p.eta_1G, p.eta_2G]) if direction == DIRECT else np.eye(2)
+        G_D = np.block([[I_D, np.zeros((2, 2))], [np.diag([p.I_1, p.I_2]), eta_M]])
+        eta_t = np.vstack([eta_t, np.eye(2, 3, k=1)])
+        eta_l = np.vstack([eta_l, np.eye(2, 4, k=1)])
+        eta_f = np.vstack([eta_f, np.eye(2)])   # erratum (76): four rows
+        return G_D, eta_t, eta_l, eta_f
+
+    def response(self, direction):
+        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
+        G_D, eta_t, eta_l, eta_f = self.system(direction)
+        S = slip_coordinates(self.p)
+        A, B, C = (np.linalg.solve(G_D, m)
+                   for m in (-eta_l @ viscous(self.p) @ np.linalg.inv(S), eta_t, eta_f))
+        return LinearResponse(S @ A[:2], S @ B[:2], S @ C[:2], A[2:], B[2:], C[2:])
+
+
+class SelfLockingDae:
+    """
+    Variant 3: four elements and two kinematic constraints, nonlinear in the signs of M.
+
+    The constraints g_omega omega = 0 are linear, so the redundant speeds are kept on them by
+    coordinate partitioning: the carrier speed and the slip are integrated, the others are
+    what g_omega makes of them. Nothing can drift off.
+    """
+
+    lagged = False
+
+    def __init__(self, parameters):
+        self.p = parameters
+
+    def constraints(self):
+        """Return g_omega, (2, 4), (80)."""
+        p = self.p
+        return np.array([
+            [1 + p.g_12, -1, -p.g_12, 0],
+            [0, 1, -1, p.g_2s * (1 + p.g_12)]])
+
+    def lift(self):
+        """Return the matrix (4, 2) that gives all speeds from y, such that g_omega omega = 0."""
+        return np.linalg.inv(np.vstack([self.constraints(), [1, 0, 0, 0], [0, 1, -1, 0]]))[:, 2:]
+
+    def system(self, direction):
+        """
+        Return G_D (6, 6), g_T (6, 3), g_L (6, 4), g_F (6, 2): (79)-(83), (86), (88).
+
+        They make G_D x + g_F F + g_L omega - g_T T = 0 with x = (e_0, e_1, e_2, e_s, M_1, M_2),
+        (87).
+        """
+        p = self.p
+        if direction == DIRECT:
+            eta_m = np.array([
+                [1 / p.eta_0B, 1 / p.eta_0B],
+                [-p.eta_1G, 0],
+                [0, -p.eta_2G],
+                [-p.g_12, 1]])
+            eta_t = np.eye(4, 3)
+        else:
+            eta_m = np.array([
+                [-p.eta_1G, -p.eta_2G],
+                [1, 0],
+                [0, 1],
+                [p.g_12 * p.eta_1G, -p.eta_2G]])
+            eta_t = np.eye(4, 3)
+            eta_t[0, 0] = 1 / p.eta_0B   # erratum 4.7.2: a second matrix changes
+        eta_f = np.array([
+            [-1 / p.eta_0B, -1 / p.eta_0B],
+            [1, 0],
+            [0, 1],
+            [0, 0]])
+        eta_l = np.array([
+            [1 / p.eta_0B, -1 / p.eta_0B, -1 / p.eta_0B, 0],
+            [0, 1, 0, 0],
+            [0, 0, 1, 0],
+            [0, 0, 0, p.n_s / p.g_2s]])
+        e_omega = np.array([
+            [1, 0, 0, 0],
+            [-1, 1, 0, 0],
+            [-1, 0, 1, 0],   # erratum (86): the carrier supports the second crown gear too
+            [0, 0, 0, 1]])
+        inertia = np.diag([p.I_0, p.I_1, p.I_2, p.I_s * p.n_s / p.g_2s])
+        G_D = np.block([[inertia, eta_m], [self.constraints(), np.zeros((2, 2))]])
+        g_T, g_L, g_F = (np.vstack([m, np.zeros((2, m.shape[1]))])
+                         for m in (eta_t, eta_l @ viscosities(p) @ e_omega, eta_f))
+        return G_D, g_T, g_L, g_F
+
+    def response(self, direction):
+        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
+        G_D, g_T, g_L, g_F = self.system(direction)
+        A, B, C = (np.linalg.solve(G_D, m) for m in (-g_L @ self.lift(), g_T, g_F))
+        to_y = np.array([[1, 0, 0, 0], [0, 1, -1, 0]])   # (e_0, e_1 - e_2)
+        return LinearResponse(to_y @ A[:4], to_y @ B[:4], to_y @ C[:4], A[4:], B[4:], C[4:])

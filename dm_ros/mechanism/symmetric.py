@@ -1,0 +1,225 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The equations of the symmetric differential with final drive (section 3 of the paper).
+
+Two formulations of one mechanism, each for direct and reverse power flow:
+
+``SymmetricOde``  variant 1: the internal moments eliminated, 2x2, (18)-(34), (38)-(39)
+``SymmetricDae``  variant 2: all elements and their constraints, 8x8, (40)-(52)
+
+Symbols and signs are those of the paper, the order of the elements is (0, 1, 2, 3, s):
+carrier, left, right, pinion, satellite. ``T`` is (T_1, T_2, T_3); a torque is positive when
+it accelerates its shaft. Where a printed equation contradicts the others, the corrected form
+stands here, marked "erratum", and a test shows that the printed one fails.
+
+Under held torques both are linear. Each gives, for one direction (+1 direct, -1 reverse),
+
+    e_D = A omega_D + B T        omega_D = (omega_1, omega_2), e_D = d omega_D/dt
+    M   = P omega_D + Q T        M = (M_F, M_1, M_2), in the sign of the paper
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dm_ros.mechanism.power_flow import DIRECT
+
+SHAFTS = ('carrier', 'left', 'right', 'pinion', 'satellite')
+MOMENTS = ('final_drive', 'left_mesh', 'right_mesh')
+
+
+class LinearResponse(NamedTuple):
+    """Accelerations and internal moments, linear in speeds and torques."""
+
+    A: np.ndarray   # (2, 2)
+    B: np.ndarray   # (2, 3)
+    P: np.ndarray   # (3, 2)
+    Q: np.ndarray   # (3, 3)
+
+
+def kinematics(p):
+    """Return g_D, (5, 2): the speeds of all elements are g_D omega_D, (5)-(6)."""
+    return np.array([
+        [0.5, 0.5],
+        [1.0, 0.0],
+        [0.0, 1.0],
+        [p.g_F / 2, p.g_F / 2],
+        [-1 / (2 * p.g_2s), 1 / (2 * p.g_2s)]])
+
+
+class SymmetricOde:
+    """Variant 1: two equations in omega_1, omega_2; the moments are recovered from them."""
+
+    def __init__(self, parameters):
+        self.p = parameters
+
+    def inertia(self):
+        """Return I = (I_0, I_1, I_2, I_3, I_s), (26)."""
+        p = self.p
+        return np.array([p.I_0, p.I_1, p.I_2, p.I_3, p.I_s])
+
+    def efficiencies(self, direction):
+        """Return eta_Sigma, eta_S, eta_T, eta_L: (26), (28), (30) direct, (38)-(39) reverse."""
+        p = self.p
+        satellite = p.n_s / (2 * p.g_2s**2)
+        if direction == DIRECT:
+            eta_0 = p.eta_FG * p.eta_0B
+            eta_1L, eta_2L = 1 / p.eta_1G - 1, 1 / p.eta_2G - 1
+            eta_sigma = np.array([
+                [1 / (2 * p.eta_FG), 1 / (2 * p.eta_FG)],
+                [1 / (eta_0 * p.eta_1G), 0],
+                [0, 1 / (eta_0 * p.eta_2G)],
+                [p.g_F**2 * p.eta_3B / 2, p.g_F**2 * p.eta_3B / 2],
+                [0, 0]])
+            eta_s = np.array([
+                [0, 0],
+                [-1 / p.eta_1G, 0],
+                [0, 1 / p.eta_2G],
+                [0, 0],
+                [-satellite, satellite]])
+            eta_t = np.array([
+                [1 / (eta_0 * p.eta_1G), 1 / (eta_0 * p.eta_2G), p.eta_3B],
+                [-1 / p.eta_1G, 1 / p.eta_2G, 0]])
+            eta_l = np.array([   # erratum (30): no eta_kG below eta_kL
+                [1 / eta_0, eta_1L / eta_0, eta_2L / eta_0, 1, 0],
+                [0, -1 / p.eta_1G, 1 / p.eta_2G, 0, 1]])
+        else:
+            eta_1L, eta_2L = p.eta_0B * p.eta_1G - 1, p.eta_0B * p.eta_2G - 1
+            eta_sigma = np.array([
+                [p.eta_0B / 2, p.eta_0B / 2],
+                [p.eta_1G * p.eta_0B, 0],
+                [0, p.eta_0B * p.eta_2G],
+                [p.g_F**2 / (2 * p.eta_FG), p.g_F**2 / (2 * p.eta_FG)],
+                [0, 0]])
+            eta_s = np.array([
+                [0, 0],
+                [-p.eta_1G, 0],
+                [0, p.eta_2G],
+                [0, 0],
+                [-satellite, satellite]])
+            eta_t = np.array([
+                [p.eta_1G * p.eta_0B, p.eta_2G * p.eta_0B, 1 / (p.eta_FG * p.eta_3B)],
+                [-p.eta_1G, p.eta_2G, 0]])
+            eta_l = np.array([
+                [1, eta_1L, eta_2L, 1 / (p.eta_FG * p.eta_3B), 0],
+                [0, -p.eta_1G, p.eta_2G, 0, 1]])
+        return eta_sigma, eta_s, eta_t, eta_l
+
+    def viscous(self):
+        """Return the matrix (5, 2) that gives L from omega_D: l (g_D - g_H), (6), (31)."""
+        p = self.p
+        g_H = np.array([[0, 0], [0.5, 0.5], [0.5, 0.5], [0, 0], [0, 0]])
+        # erratum (31): the speeds of all elements, omega and not omega_D
+        return np.diag([p.l_0, p.l_1, p.l_2, p.l_3, p.l_s]) @ (kinematics(p) - g_H)
+
+    def response(self, direction):
+        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
+        p = self.p
+        eta_sigma, eta_s, eta_t, eta_l = self.efficiencies(direction)
+        I_D = np.array([self.inertia() @ eta_sigma, self.inertia() @ eta_s])          # (25), (27)
+        g_T = np.diag([1, 1, p.g_F])                                                   # (28)
+        g_L = np.diag([1, 1, 1, p.g_F, p.n_s / p.g_2s])                                # (30)
+        L = self.viscous()
+        A = -np.linalg.solve(I_D, eta_l @ g_L @ L)                                     # (34)
+        B = np.linalg.solve(I_D, eta_t @ g_T)
+
+        # the moments: M_F from (17) or the pinion equation in reverse flow, M_k from (10)
+        e = np.array([[0.5, 0.5], [1, 0], [0, 1]])   # (e_0, e_1, e_2) from e_D
+        if direction == DIRECT:
+            eta_M = np.diag([1, 1 / p.eta_1G, 1 / p.eta_2G])
+            inertia = np.diag([-p.I_3 * p.g_F**2 * p.eta_3B, p.I_1, p.I_2])
+            drag = np.array([-p.g_F * L[3], L[1], L[2]])
+            torque = np.array([[0, 0, p.g_F * p.eta_3B], [-1, 0, 0], [0, -1, 0]])
+        else:
+            eta_M = np.diag([1 / p.eta_FG, 1, 1])
+            inertia = np.diag([p.I_3 * p.g_F**2, -p.I_1, -p.I_2])
+            drag = np.array([p.g_F / p.eta_3B * L[3], -L[1], -L[2]])
+            torque = np.array([[0, 0, -p.g_F / p.eta_3B], [1, 0, 0], [0, 1, 0]])
+        return LinearResponse(A, B,
+                              eta_M @ (inertia @ e @ A + drag),
+                              eta_M @ (inertia @ e @ B + torque))
+
+
+class SymmetricDae:
+    """
+    Variant 2: five elements and three kinematic constraints, solved for (e, M), (40)-(52).
+
+    The constraints g_omega omega = 0 are linear, so the redundant speeds are kept on them by
+    coordinate partitioning: omega_1 and omega_2 are integrated, the other three are what
+    g_omega makes of them. Nothing can drift off.
+    """
+
+    INDEPENDENT, DEPENDENT = [1, 2], [0, 3, 4]   # of (0, 1, 2, 3, s)
+
+    def __init__(self, parameters):
+        self.p = parameters
+
+    def constraints(self):
+        """Return g_omega, (3, 5), (47)."""
+        p = self.p
+        return np.array([
+            [2, -1, -1, 0, 0],
+            [p.g_F, 0, 0, -1, 0],
+            [0, 1, -1, 0, 2 * p.g_2s]])
+
+    def lift(self):
+        """Return the matrix (5, 2) that gives all speeds from the independent ones."""
+        g = self.constraints()
+        N = np.zeros((5, 2))
+        N[self.INDEPENDENT] = np.eye(2)
+        N[self.DEPENDENT] = -np.linalg.solve(g[:, self.DEPENDENT], g[:, self.INDEPENDENT])
+        return N
+
+    def efficiencies(self, direction):
+        """Return eta_M (5, 3), eta_L (5, 5) and eta_T (5, 5): (42) direct, (52) reverse."""
+        p = self.p
+        eta_l = np.array([
+            [1 / p.eta_0B, -1 / p.eta_0B, -1 / p.eta_0B, 0, 0],
+            [0, 1, 0, 0, 0],
+            [0, 0, 1, 0, 0],
+            [0, 0, 0, 1 / p.eta_3B, 0],
+            [0, 0, 0, 0, 1]])
+        if direction == DIRECT:
+            eta_m = np.array([
+                [-p.eta_FG, 1 / p.eta_0B, 1 / p.eta_0B],
+                [0, -p.eta_1G, 0],
+                [0, 0, -p.eta_2G],
+                [1 / p.eta_3B, 0, 0],
+                [0, -1, 1]])
+            eta_t = np.eye(5)
+        else:
+            eta_m = np.array([   # erratum (52): eta_kG in the satellite row
+                [1 / p.eta_0B, -p.eta_1G, -p.eta_2G],
+                [0, 1, 0],
+                [0, 0, 1],
+                [-p.eta_FG, 0, 0],
+                [0, p.eta_1G, -p.eta_2G]])
+            eta_t = np.diag([1, 1, 1, 1 / p.eta_3B, 1])   # erratum (52): T_3/eta_3B
+        return eta_m, eta_l, eta_t
+
+    def system(self, direction):
+        """Return A (8, 8) and B (8, 8) of x' = A x + B u, x = (omega, K), (49)-(51)."""
+        p = self.p
+        eta_m, eta_l, eta_t = self.efficiencies(direction)
+        inertia = np.diag([p.I_0, p.I_1, p.I_2, p.I_3, p.I_s])
+        g = np.diag([1, 1, 1, p.g_F, p.n_s / p.g_2s])   # erratum (41): five entries
+        l_omega = np.diag([p.l_0, p.l_1, p.l_2, p.l_3, p.l_s])
+        e_omega = np.array([
+            [1, 0, 0, 0, 0],
+            [-1, 1, 0, 0, 0],
+            [-1, 0, 1, 0, 0],
+            [0, 0, 0, 1, 0],
+            [0, 0, 0, 0, 1]])
+        I_D = np.block([[inertia @ g, eta_m], [self.constraints(), np.zeros((3, 3))]])
+        g_L = np.block([[eta_l @ g @ l_omega @ e_omega, np.zeros((5, 3))],
+                        [np.zeros((3, 8))]])
+        g_T = np.block([[eta_t @ g, np.zeros((5, 3))], [np.zeros((3, 8))]])
+        return -np.linalg.solve(I_D, g_L), np.linalg.solve(I_D, g_T)
+
+    def response(self, direction):
+        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
+        A, B = self.system(direction)
+        A, B = A[:, :5] @ self.lift(), B[:, 1:4]   # T_D = (0, T_1, T_2, T_3, 0, 0, 0, 0), (48)
+        return LinearResponse(A[self.INDEPENDENT], B[self.INDEPENDENT], A[5:], B[5:])

@@ -1,0 +1,111 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Records what a node ``differential`` publishes, as columns like those of ``simulate``."""
+
+from diagnostic_msgs.msg import DiagnosticArray
+import numpy as np
+import rclpy
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Int8
+
+from dm_ros.files.output import column_names
+from dm_ros.motion.simulation import Simulation
+from dm_ros.ros.messages import never_called, poll, Polled
+
+DEEP_QOS = QoSProfile(depth=5000)
+
+
+class Recorder:
+    """
+    A recorder in a ROS context of its own; call ``poll`` more often than ``DEEP_QOS`` overflows.
+
+    A row is a tick: both messages with its stamp, and the power flow that was sent after them
+    and before the joint states of the next tick.
+    """
+
+    def __init__(self, node, variant):
+        """:param node: full name of the node to record; variant: which it runs."""
+        self._names = Simulation(variant)
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context,
+                   signal_handler_options=rclpy.SignalHandlerOptions.NO)
+        self._node = rclpy.create_node('recorder', context=self._context)
+        group = Polled()
+
+        def subscribe(message_type, topic):
+            return self._node.create_subscription(message_type, topic, never_called, DEEP_QOS,
+                                                  callback_group=group)
+        self._joint_states = subscribe(JointState, f'{node}/joint_states')
+        self._internal_moments = subscribe(JointState, f'{node}/internal_moments')
+        self._power_flow = subscribe(Int8, f'{node}/power_flow')
+        self._diagnostics = subscribe(DiagnosticArray, '/diagnostics')
+        self.loaded = False      # has any shaft had a torque?
+        self.reports = 0         # of /diagnostics
+        self._missed_before = self._missed = 0
+        self.clear()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+    def clear(self):
+        """Forget what was recorded."""
+        self._joints, self._moments, self._flows = [], {}, []
+        self._missed_before = self._missed
+
+    def poll(self):
+        """Take all messages that came; return how many ticks they bring."""
+        before = len(self._joints)
+        for message, info in poll(self._joint_states):
+            self._joints.append((info['source_timestamp'], message))
+            self.loaded = self.loaded or any(message.effort)
+        for message, _ in poll(self._internal_moments):
+            self._moments[stamp(message)] = message.effort
+        for message, info in poll(self._power_flow):
+            self._flows.append((info['source_timestamp'], message.data))
+        for message, _ in poll(self._diagnostics):
+            self.reports += 1
+            for pair in (pair for s in message.status for pair in s.values):
+                if pair.key == 'missed ticks':
+                    self._missed = int(pair.value)
+        return len(self._joints) - before
+
+    @property
+    def missed(self):
+        """Ticks that the node reported as missed during the record."""
+        return self._missed - self._missed_before
+
+    def columns(self, duration):
+        """
+        Return the record as ``{column: array}``, with the columns of OUT.csv of ``simulate``.
+
+        :param duration: s, what came later after the first tick is left out.
+        :raises RuntimeError: for a record without two whole ticks.
+        """
+        table = np.array(list(self._rows()))
+        if len(table) < 2:
+            raise RuntimeError('the record is empty')
+        table[:, 0] -= table[0, 0]
+        return dict(zip(column_names(self._names), table[table[:, 0] <= duration].T))
+
+    def _rows(self):
+        sent = np.array([timestamp for timestamp, _ in self._flows])
+        inputs = [self._names.shafts.index(name) for name in self._names.inputs]
+        ends = [timestamp for timestamp, _ in self._joints[1:]] + [np.inf]
+        for (timestamp, joints), end in zip(self._joints, ends):
+            moments = self._moments.get(stamp(joints))
+            flow = np.searchsorted(sent, timestamp)
+            if moments is not None and flow < len(sent) and sent[flow] < end:
+                sec, nanosec = stamp(joints)
+                yield (sec + nanosec * 1e-9, *joints.velocity, *joints.position,
+                       *(joints.effort[i] for i in inputs), *moments, self._flows[flow][1])
+
+
+def stamp(message):
+    """Return the stamp of a message as (seconds, nanoseconds)."""
+    return message.header.stamp.sec, message.header.stamp.nanosec

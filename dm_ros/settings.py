@@ -1,0 +1,87 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a run has beside its mechanism, and the simulation that it makes of both."""
+
+from dataclasses import dataclass
+
+from dm_ros.mechanism.parameters import (
+    Parameters,
+    row,
+    SelfLockingParameters,
+    SymmetricParameters,
+)
+from dm_ros.motion.models import MODELS
+from dm_ros.motion.simulation import Simulation
+
+
+def initial_velocity(shaft):
+    return row(f'initial_velocity.{shaft}', 0.0, 'rad/s', -1e6, 1e6,
+               f'speed of the {shaft} shaft at the start and after a reset')
+
+
+@dataclass(frozen=True)
+class NodeParameters(Parameters):
+    """
+    What the node has beside its mechanism.
+
+    :raises ValueError: names the parameter, its value and what is allowed.
+    """
+
+    variant: str = row('variant', 'symmetric_ode', '', 0, 0, 'the mechanism and its formulation',
+                       kind=str, read_only=True,
+                       choices=('symmetric_ode', 'symmetric_dae',
+                                'lsd_lagged', 'lsd_ode', 'lsd_dae'))
+    mode: str = row('mode', 'realtime', '', 0, 0,
+                    'what advances time: the clock, or each message on ~/torques by one tick',
+                    kind=str, read_only=True, choices=('realtime', 'lockstep'))
+    rate: float = row('rate', 200.0, 'Hz', 0.1, 1e4, 'ticks in a second', read_only=True)
+    substeps: int = row('substeps', 1, '1', 1, 1000, 'solver steps in a tick', kind=int)
+    torque_timeout: float = row('torque_timeout', 0.5, 's', 0.0, 1e6,
+                                'a torque older than this becomes zero; 0 holds for ever')
+    torque_limit: float = row('torque_limit', 1e5, 'N m', 0.0, 1e9,
+                              'larger demands are clamped to this and counted')
+    deadband: float = row('power_flow_deadband', 0.0, 'W', 0.0, 1e9,
+                          'difference of power within which the power-flow index stays')
+    real_time_factor: float = row('real_time_factor', 1.0, '1', 0.0, 1e3,
+                                  'speed of simulated time against the steady clock',
+                                  above_low=True)
+    publish_clock: bool = row('publish_clock', False, '', 0, 0,
+                              'drive /clock with simulated time', kind=bool, read_only=True)
+    energy_audit: bool = row('energy_audit', True, '', 0, 0,
+                             'keep the energy balance, for /diagnostics', kind=bool,
+                             read_only=True)
+    realtime_priority: int = row('realtime_priority', 0, '1', 0, 99,
+                                 'SCHED_FIFO priority of the loop, 0 for none',
+                                 kind=int, read_only=True)
+    initial_left: float = initial_velocity('left')
+    initial_right: float = initial_velocity('right')
+    initial_front: float = initial_velocity('front')
+    initial_rear: float = initial_velocity('rear')
+
+    def initial_velocity(self, shafts):
+        """Return the initial speeds of some output shafts, rad/s, as a tuple."""
+        named = self.named()
+        return tuple(named[f'initial_velocity.{shaft}'] for shaft in shafts)
+
+
+def known_rows():
+    """Return ``{full name: Row}`` of every parameter there is."""
+    return {name: entry
+            for table in (NodeParameters, SymmetricParameters, SelfLockingParameters)
+            for name, entry in table.rows().values()}
+
+
+def make_simulation(variant, values, dt=None):
+    """
+    Return the ``Simulation`` that a node with the given parameters would run.
+
+    :param values: ``{full name: value}``, as ``read_parameter_file`` returns them.
+    :param dt: length of a tick, s; None for that of the parameter ``rate``.
+    """
+    node = NodeParameters().changed(NodeParameters.part_of(values))
+    model = MODELS[variant][0]
+    return Simulation(
+        variant, 1 / node.rate if dt is None else dt, model.parameters_type.part_of(values),
+        substeps=node.substeps, power_flow_deadband=node.deadband,
+        initial_velocity=node.initial_velocity(model.outputs))

@@ -1,0 +1,157 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The node ``differential`` in lockstep, in a test's own process, in a ROS domain of its own."""
+
+import os
+import time
+
+from dm_ros.files.record import Record
+from dm_ros.testing.direct import ticks_of
+
+PATIENCE = 10.0   # s of real time without a tick
+LAST_ANSWER = 0.5   # s of real time for the answer to the last state, before a reset
+
+
+class LockstepDifferential:
+    """
+    The node ``differential`` in lockstep, in a ROS context and domain of its own.
+
+    Use it as a context manager. Nodes of the test are made with ``context=differential.context``
+    and given to ``attach``: one of them answers each message on ``/differential/joint_states``
+    with one on ``/differential/torques``.
+
+    :param variant: one of ``dm_ros.VARIANTS``; rate: ticks in a second.
+    :param parameters: mapping from parameter names of the node to values.
+    """
+
+    def __init__(self, variant='symmetric_ode', rate=1000.0, parameters=None):
+        self._options = {**(parameters or {}), 'variant': variant, 'rate': float(rate),
+                         'mode': 'lockstep'}
+        self.snapshots = []
+        self._unanswered = 0   # states that the nodes of the test have still to answer: 0 or 1
+
+    def __enter__(self):
+        # only those who use topics need ROS
+        from contextlib import ExitStack
+
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.parameter import Parameter
+
+        from dm_ros.ros.domain import own_domain
+        from dm_ros.ros.node import DifferentialNode
+
+        with ExitStack() as stack:
+            self.domain = stack.enter_context(own_domain())
+            before = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+            try:
+                self.context = rclpy.Context()
+                rclpy.init(context=self.context, domain_id=self.domain)
+            finally:
+                if before is None:
+                    del os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE']
+                else:
+                    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = before
+            stack.callback(rclpy.shutdown, context=self.context)
+            self.executor = SingleThreadedExecutor(context=self.context)
+            stack.callback(self.executor.shutdown)
+            self.node = DifferentialNode(context=self.context, parameter_overrides=[
+                Parameter(name, value=value) for name, value in self._options.items()])
+            self.node.control.running.clear()
+            self.node.on_tick = self._on_tick
+            stack.callback(self.node.close)
+            self.executor.add_node(self.node)
+            self.node.start()
+            self._attached = []
+            stack.callback(self._detach)
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_):
+        self._stack.close()
+
+    @property
+    def simulation(self):
+        """The ``Simulation`` in the node."""
+        return self.node.simulation
+
+    def attach(self, *nodes):
+        """Let nodes of the test take part, and destroy them in the end; return the first."""
+        for node in nodes:
+            self.executor.add_node(node)
+            self._attached.append(node)
+        return nodes[0]
+
+    def reset(self):
+        """
+        Go back to the start; a further run repeats the first one bit for bit.
+
+        The nodes of the test must go back to their start as well.
+        """
+        end = time.monotonic() + LAST_ANSWER
+        while self._unanswered and time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.01)
+            self._unanswered -= self.node.discard_torques()
+        with self.node.control.lock:
+            self.node.reset()
+        self._unanswered = 0
+
+    def run(self, seconds=None, until=None):
+        """
+        Step until a condition or for a time, whichever comes first; both in exact ticks.
+
+        At the start the state is published, so that the nodes of the test have something to
+        answer. Their answer to the last state of a run is the first one of the next run.
+
+        :param seconds: simulated time.
+        :param until: function of a ``Snapshot``; true at the last tick.
+        :return: the ``Record`` of this run.
+        :raises TimeoutError: when no tick comes for ten seconds of real time.
+        """
+        first = len(self.snapshots)
+        count = ticks_of(seconds, until, self.simulation)
+        self._last = lambda snapshot: (
+            len(self.snapshots) - first == count or until is not None and until(snapshot))
+        self._await_connections()
+        control = self.node.control
+        with control.lock:
+            if not self._unanswered:
+                self._unanswered = 1
+                self.node.publish_state()
+            control.running.set()
+        ticks, end = first, time.monotonic() + PATIENCE
+        while control.running.is_set():
+            self.executor.spin_once(timeout_sec=0.05)
+            if len(self.snapshots) > ticks:
+                ticks, end = len(self.snapshots), time.monotonic() + PATIENCE
+            elif time.monotonic() > end:
+                control.running.clear()
+                raise TimeoutError(
+                    f'no tick for {PATIENCE:g} s after {ticks - first} ticks: does a node answer '
+                    '/differential/joint_states with /differential/torques?')
+        return Record(self.simulation, self.snapshots[first:])
+
+    @property
+    def record(self):
+        """The ``Record`` of all runs."""
+        return Record(self.simulation, self.snapshots)
+
+    def _on_tick(self, snapshot):
+        self.snapshots.append(snapshot)
+        if self._last(snapshot):
+            self.node.control.running.clear()
+
+    def _await_connections(self):
+        end = time.monotonic() + PATIENCE
+        while not self.node.is_connected():
+            if time.monotonic() > end:
+                raise TimeoutError('nobody publishes on /differential/torques and listens to '
+                                   '/differential/joint_states')
+            self.executor.spin_once(timeout_sec=0.01)
+
+    def _detach(self):
+        for node in self._attached:
+            self.executor.remove_node(node)
+            node.destroy_node()

@@ -1,0 +1,79 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Fixtures for the tests of a controller, active in pytest as soon as dm_ros is installed.
+
+``differential``         makes a ``LockstepDifferential``: real topics, the test's own nodes
+``direct_differential``  makes a ``DirectDifferential``: a control law as a function, no topics
+
+    def test_grip(differential):
+        vehicle = differential(variant='lsd_ode', rate=500.0)
+        vehicle.attach(Controller(context=vehicle.context))
+        record = vehicle.run(seconds=5.0)
+        assert abs(record.slip[record.time > 0.4]).max() < 5.0
+
+With ``--differential-records FOLDER`` a failing test leaves the CSV and the picture of each of
+its differentials there.
+"""
+
+from contextlib import ExitStack
+import re
+
+import pytest
+
+FAILED = pytest.StashKey()
+
+
+def pytest_addoption(parser):
+    parser.getgroup('dm_ros').addoption(
+        '--differential-records', metavar='FOLDER',
+        help='where a failing test leaves the CSV and the picture of its differentials')
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    outcome = yield
+    if outcome.get_result().failed:
+        item.stash[FAILED] = True
+
+
+@pytest.fixture
+def differential(request):
+    """Return a function that starts a ``LockstepDifferential``; its arguments are those."""
+    from dm_ros.testing.lockstep import LockstepDifferential
+    with ExitStack() as stack:
+        made = []
+
+        def make(variant='symmetric_ode', rate=1000.0, parameters=None):
+            made.append(stack.enter_context(LockstepDifferential(variant, rate, parameters)))
+            return made[-1]
+        yield make
+        leave_records(request, made)
+
+
+@pytest.fixture
+def direct_differential(request):
+    """Return a function that makes a ``DirectDifferential``; its arguments are those."""
+    from dm_ros.testing.direct import DirectDifferential
+    made = []
+
+    def make(variant='symmetric_ode', rate=1000.0, **options):
+        made.append(DirectDifferential(variant, rate, **options))
+        return made[-1]
+    yield make
+    leave_records(request, made)
+
+
+def leave_records(request, differentials):
+    """Write the records of a failed test, if somebody wants them."""
+    folder = request.config.getoption('--differential-records')
+    if not folder or not request.node.stash.get(FAILED, False):
+        return
+    folder = request.config.rootpath / folder
+    folder.mkdir(parents=True, exist_ok=True)
+    name = re.sub(r'[^\w.-]+', '_', request.node.nodeid)
+    for number, made in enumerate(differentials, start=1):
+        if made.snapshots:
+            made.record.save_csv(folder / f'{name}_{number}.csv')
+            made.record.save_plot(folder / f'{name}_{number}.png')

@@ -1,0 +1,163 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The main job in one command: a differential and its load as processes that talk over DDS.
+
+Starts ``differential`` and ``play_torques`` on this machine only, in a ROS domain of their own,
+records what the node publishes, reports it, and writes a CSV and a picture.
+"""
+
+import argparse
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+
+from dm_ros.files.output import replacing, write_csv
+from dm_ros.files.plot import save_plot
+from dm_ros.motion.models import VARIANTS
+from dm_ros.ros.domain import own_domain
+from dm_ros.ros.recorder import Recorder
+from dm_ros.tools.progress import progress
+
+PATIENCE = 30.0   # s, until the processes have found each other
+
+
+def parser():
+    """Return the parser of the command line."""
+    result = argparse.ArgumentParser('demo', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument('--variant', choices=VARIANTS, default='symmetric_ode',
+                        help='the mechanism and its formulation')
+    result.add_argument('--duration', type=positive, default=10.0, metavar='S',
+                        help='length of the recording, default 10')
+    result.add_argument('--rate', type=positive, default=200.0, metavar='HZ',
+                        help='ticks in a second, default 200')
+    result.add_argument('--out', type=Path, default=Path('run'), metavar='FOLDER',
+                        help='where the CSV and the PNG go, default run')
+    return result
+
+
+def positive(text):
+    number = float(text)
+    if not 0.0 < number < 1e6:
+        raise argparse.ArgumentTypeError(f'{text} is not a positive number')
+    return number
+
+
+@contextmanager
+def process(module, *arguments):
+    """Run a module of the package as a process that ends with the block."""
+    child = subprocess.Popen([sys.executable, '-m', f'dm_ros.{module}', *arguments])
+    try:
+        yield child
+    finally:
+        child.send_signal(signal.SIGINT)
+        try:
+            child.wait(10.0)
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
+
+
+def wait(condition, what, *children):
+    """Wait until the condition holds; raise RuntimeError when a child ends or time runs out."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        if any(child.poll() is not None for child in children):
+            raise RuntimeError(f'a process ended before {what}')
+        if time.monotonic() > end:
+            raise RuntimeError(f'after {PATIENCE:g} s still no {what}')
+        time.sleep(0.02)
+
+
+def next_report(recorder):
+    """Return the condition that one more message of /diagnostics has come."""
+    before = recorder.reports
+
+    def condition():
+        recorder.poll()
+        return recorder.reports > before
+    return condition
+
+
+def record(arguments):
+    """Return the recorder after a run of the two processes."""
+    namespace = f'/demo_{os.getpid()}'   # even in a shared domain nobody else is heard
+    parameters = ['--ros-args', '-r', f'__ns:={namespace}', '-p', f'variant:={arguments.variant}',
+                  '-p', f'rate:={arguments.rate!r}']
+    with Recorder(f'{namespace}/differential', arguments.variant) as recorder:
+        with process('ros.command', *parameters) as node:
+            wait(recorder.poll, 'state of the differential', node)
+            with process('tools.play_torques', '--variant', arguments.variant,
+                         '--node', f'{namespace}/differential') as player:
+                wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft',
+                     node, player)
+                wait(next_report(recorder), 'report of the differential', node, player)
+                recorder.clear()
+                end = time.monotonic() + arguments.duration
+                with progress(total=round(arguments.duration * arguments.rate)) as bar:
+                    while (left := end - time.monotonic()) > 0.0:
+                        time.sleep(min(0.02, left))
+                        bar.update(recorder.poll())
+                        if node.poll() is not None:
+                            raise RuntimeError('the differential ended before the recording')
+                # missed ticks are told once a second
+                wait(next_report(recorder), 'report of the differential', node, player)
+    return recorder
+
+
+def report(columns, recorder, rate):
+    """Return the report as lines."""
+    time_, flow = columns['time'], columns['power_flow']
+    span = time_[-1] - time_[0]
+    lines = [
+        f'recorded      {len(time_)} ticks in {span:.2f} s',
+        f'rate held     {(len(time_) - 1) / span:.2f} Hz of {rate:g} Hz',
+        f'missed ticks  {recorder.missed}',
+        f'power flow    direct {100 * (flow > 0).mean():.0f} %, '
+        f'reverse {100 * (flow < 0).mean():.0f} %',
+        '',
+        f'{"":24}{"lowest":>12}{"highest":>12}']
+    units = {'velocity': 'rad/s', 'moment': 'N m', 'torque': 'N m'}
+    for name, values in columns.items():
+        kind, _, what = name.partition('.')
+        if kind in units:
+            lines.append(f'{kind + " " + what:24}{values.min():12.2f}{values.max():12.2f}'
+                         f'  {units[kind]}')
+    return lines
+
+
+def main(args=None):
+    """Run the demo; return the exit code."""
+    arguments = parser().parse_args(args)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    # a SIGTERM ends the processes as well
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    try:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        with own_domain() as domain:
+            os.environ['ROS_DOMAIN_ID'] = str(domain)
+            recorder = record(arguments)
+        columns = recorder.columns(arguments.duration)
+        csv = arguments.out / f'{arguments.variant}.csv'
+        png = arguments.out / f'{arguments.variant}.png'
+        write_csv(columns, csv)
+        with replacing(png, 'wb') as file:
+            save_plot(columns, file, f'{arguments.variant} at {arguments.rate:g} Hz')
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
+    except (OSError, RuntimeError, ValueError) as error:
+        print(f'demo: {error}', file=sys.stderr)
+        return 1
+    print('\n'.join(report(columns, recorder, arguments.rate)))
+    print(f'\nwritten       {csv}\n              {png}')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,171 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Publish torques to a differential node: a built-in load, or a CSV file."""
+
+import argparse
+import signal
+import sys
+import time
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.exceptions import NameValidationException
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from sensor_msgs.msg import JointState
+
+from dm_ros.files.torque_table import read_torque_file
+from dm_ros.mechanism.loads import PROFILES
+from dm_ros.motion.models import MODELS, VARIANTS
+from dm_ros.tools.progress import progress
+
+EPILOG = """\
+FILE is a CSV as `simulate` reads it: a header "time,<shaft>,..." with every input shaft, and a
+row's torques hold until the time of the next row, those of the last row beyond it. Without
+--duration the last time ends the playing. Torques go to the topic <node>/torques, in one message
+for all input shafts. At the end, and on Ctrl-C or SIGTERM as well, zero torques are published so
+that no load stays behind.
+"""
+
+
+def parser():
+    """Return the parser of the command line."""
+    result = argparse.ArgumentParser('play_torques', description=__doc__, epilog=EPILOG,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    family = result.add_mutually_exclusive_group()
+    family.add_argument('--variant', choices=VARIANTS, default='symmetric_ode',
+                        help='the variant that the node runs: it decides the input shafts and '
+                        'the built-in load; default: %(default)s')
+    family.add_argument('--profile', choices=PROFILES, help='the same by the mechanism alone')
+    result.add_argument('--torques', metavar='FILE', help='play this CSV, not the built-in load')
+    result.add_argument('--rate', type=_positive, default=100.0, metavar='HZ',
+                        help='messages in a second; default: 100')
+    result.add_argument('--duration', type=_positive, metavar='S',
+                        help='how long to play; default: to the end of FILE, or endless')
+    result.add_argument('--node', default='/differential', metavar='NAME',
+                        help='name of the differential node; default: %(default)s')
+    result.add_argument('--wait', type=_not_negative, default=10.0, metavar='S',
+                        help='how long to wait for a subscriber before playing all the same; '
+                        'default: 10')
+    return result
+
+
+def _not_negative(text):
+    value = float(text)
+    if not 0.0 <= value <= 1e9:
+        raise argparse.ArgumentTypeError(f'{text} must be in [0, 1e+09]')
+    return value
+
+
+def _positive(text):
+    if not _not_negative(text) > 0.0:
+        raise argparse.ArgumentTypeError(f'{text} must be above 0')
+    return float(text)
+
+
+class Player:
+    """Publishes torques to a node's topic ``torques``."""
+
+    def __init__(self, node, target, inputs):
+        self._node = node
+        reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+        topic = f'{target.rstrip("/")}/torques'
+        self._publisher = node.create_publisher(JointState, topic, reliable)
+        self._message = JointState(name=list(inputs), effort=[0.0] * len(inputs))
+
+    def wait(self, seconds):
+        """Wait for a subscriber, at most so long, and tell how it went."""
+        log, topic = self._node.get_logger(), self._publisher.topic_name
+        deadline = time.monotonic() + seconds
+        if not self._publisher.get_subscription_count() and seconds > 0.0:
+            log.info(f'waiting up to {seconds:g} s for a subscriber of {topic}')
+        while not self._publisher.get_subscription_count():
+            if time.monotonic() >= deadline:
+                log.warning(f'{topic} has no subscriber, playing all the same')
+                return
+            time.sleep(0.02)
+        log.info(f'playing to {topic}')
+
+    def publish(self, torques):
+        """Publish one set of torques, N m, in the order of the inputs."""
+        self._message.header.stamp = self._node.get_clock().now().to_msg()
+        for index, torque in enumerate(torques):
+            self._message.effort[index] = float(torque)
+        self._publisher.publish(self._message)
+
+    def play(self, torques_at, rate, count=None):
+        """
+        Publish ``torques_at(n)`` at ``n / rate`` seconds from now on, for n below count.
+
+        The deadlines are absolute, so that nothing adds up; those that were missed, as after a
+        suspension, are skipped.
+        """
+        with progress(total=count, unit='message') as bar:
+            start, n = time.monotonic(), 0
+            while count is None or n < count:
+                self.publish(torques_at(n))
+                due = max(n + 1, int((time.monotonic() - start) * rate))
+                bar.update(due - n)
+                n = due
+                time.sleep(max(0.0, start + n / rate - time.monotonic()))
+
+    def unload(self):
+        """Publish zero torques and wait until they have arrived."""
+        self.publish([0.0] * len(self._message.name))
+        self._publisher.wait_for_all_acked(Duration(seconds=1))
+
+
+def load(arguments):
+    """
+    Return what to play: names of the inputs, a function of n, the number of messages or None.
+
+    :raises ValueError: for a CSV that is not as it should be.
+    """
+    rate, count = arguments.rate, None
+    family = arguments.profile or arguments.variant.split('_')[0]
+    inputs = next(model.inputs for variant, (model, _) in MODELS.items()
+                  if variant.startswith(family))
+    if arguments.torques:
+        held = read_torque_file(arguments.torques, inputs).held(1 / rate)
+        torques_at, count = held.at, len(held)
+    else:
+        def torques_at(n):
+            return PROFILES[family](n / rate)
+    if arguments.duration:
+        count = max(1, round(arguments.duration * rate))
+    return inputs, torques_at, count
+
+
+def main(args=None):
+    """Run the tool ``play_torques`` and return its exit code."""
+    args = sys.argv if args is None else ['play_torques', *args]
+    # rclpy's own handlers would shut down before the zero torques are out
+    signals = (signal.SIGINT, signal.SIGTERM)
+    for number in signals:
+        signal.signal(number, signal.default_int_handler)
+    player = None
+    try:
+        arguments = parser().parse_args(remove_ros_args(args)[1:])
+        inputs, torques_at, count = load(arguments)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        player = Player(rclpy.create_node('play_torques'), arguments.node, inputs)
+        player.wait(arguments.wait)
+        player.play(torques_at, arguments.rate, count)
+    except KeyboardInterrupt:
+        pass
+    except (ValueError, RuntimeError, NameValidationException) as error:  # RuntimeError: rclpy
+        print('play_torques: error:', ' '.join(str(error).splitlines()), file=sys.stderr)
+        return 2
+    finally:
+        for number in signals:
+            signal.signal(number, signal.SIG_IGN)
+        if player:
+            player.unload()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

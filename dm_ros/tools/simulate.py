@@ -1,0 +1,126 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Simulate a differential without ROS, faster than real time: torques from CSV, results to CSV."""
+
+import argparse
+from array import array
+from contextlib import ExitStack
+import os
+import sys
+
+import numpy as np
+
+from dm_ros.files.output import as_row, column_names, replacing
+from dm_ros.files.parameter_file import read_parameter_file
+from dm_ros.files.plot import require_matplotlib, save_plot
+from dm_ros.files.torque_table import read_torque_file
+from dm_ros.motion.models import VARIANTS
+from dm_ros.settings import make_simulation, NodeParameters
+from dm_ros.tools.ending import run_tool
+from dm_ros.tools.progress import progress
+
+EPILOG = """\
+IN.csv has a header "time,<shaft>,..." with every input shaft of the variant, in any order
+(symmetric: pinion, left, right; lsd: carrier, front, rear), then rows of s and N m. A row's
+torques hold until the time of the next row; before the first row they are zero; the time of the
+last row ends the run, which begins at time 0. Each tick takes the torques in force at its start;
+a time less than 1/1000 of a tick after that start counts as on it.
+
+OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), torque.<input>
+(N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse): a row for the start, then one for
+the end of each tick. Without --out and --plot it goes to stdout.
+
+Of FILE, a ROS 2 parameter file, these count: the parameters of the mechanism, rate, substeps,
+power_flow_deadband and initial_velocity.
+"""
+
+
+def parser():
+    """Return the parser of the command line."""
+    result = argparse.ArgumentParser('simulate', description=__doc__, epilog=EPILOG,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument('--variant', required=True, choices=VARIANTS,
+                        help='the mechanism and its formulation')
+    result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
+    result.add_argument('--torques', metavar='IN.csv', required=True, help='torques over time')
+    result.add_argument('--dt', type=float, metavar='S',
+                        help='length of a tick; default: 1/rate of FILE, '
+                        f'else {1 / NodeParameters().rate:g}')
+    result.add_argument('--out', metavar='OUT.csv', help='where the results go')
+    result.add_argument('--plot', metavar='OUT.png', help='where a picture of them goes, as PNG')
+    return result
+
+
+def write_record(simulation, torques, file=None, record=None):
+    """
+    Run a simulation and write the start and the end of each tick.
+
+    :param torques: sized iterable, the torques of each tick.
+    :param file: text file that gets CSV.
+    :param record: array of doubles that gets the rows one after the other.
+    """
+    names = column_names(simulation)
+    line = ','.join(['%.17g'] * (len(names) - 1)) + ',%d\n'
+
+    def write(row):
+        if file is not None:
+            file.write(line % row)
+        if record is not None:
+            record.extend(row)
+
+    if file is not None:
+        file.write(','.join(names) + '\n')
+    write(as_row(simulation.snapshot()))
+    step = simulation.step
+    for torque in progress(torques, total=len(torques)):
+        write(as_row(step(torque)))
+
+
+def run(arguments):
+    """Do what the command line says; raise ValueError or OSError where it cannot be done."""
+    if arguments.plot:
+        require_matplotlib()   # before a run that may take minutes
+    files = [os.path.realpath(path) for path in (arguments.torques, arguments.params,
+                                                 arguments.out, arguments.plot) if path]
+    if len(set(files)) < len(files):
+        raise ValueError(f'{max(files, key=files.count)}: given for two files')
+    values = read_parameter_file(arguments.params) if arguments.params else {}
+    simulation = make_simulation(arguments.variant, values, arguments.dt)
+    table = read_torque_file(arguments.torques, simulation.inputs)
+    try:
+        torques = table.held(simulation.dt)
+    except ValueError as error:
+        raise ValueError(f'{arguments.torques}: {error}') from None
+    with ExitStack() as stack:
+        picture = record = file = None
+        if arguments.plot:
+            picture, record = stack.enter_context(replacing(arguments.plot, 'wb')), array('d')
+        if arguments.out:
+            file = stack.enter_context(replacing(arguments.out, 'w'))
+        elif not picture:
+            # a file of its own: the interpreter stumbles at its end over a sys.stdout that failed
+            file = stack.enter_context(open(1, 'w', closefd=False))
+        try:
+            write_record(simulation, torques, file, record)
+        except ValueError as error:
+            raise ValueError(f'{arguments.torques}: after {simulation.time:g} s: '
+                             f'{error}') from None
+        if picture:
+            names = column_names(simulation)
+            columns = np.frombuffer(record).reshape(-1, len(names)).T
+            save_plot(dict(zip(names, columns, strict=True)), picture, arguments.variant)
+    speeds = zip(simulation.shafts, simulation.snapshot().velocity, strict=True)
+    print(f'simulate: {len(torques)} ticks, {simulation.time:.6g} s, final speeds in rad/s:',
+          ', '.join(f'{shaft} {speed:.6g}' for shaft, speed in speeds), file=sys.stderr)
+
+
+def main(args=None):
+    """Run the tool ``simulate`` and return its exit code."""
+    arguments = parser().parse_args(args)
+    outputs = [path for path in (arguments.out, arguments.plot) if path] or ['stdout']
+    return run_tool('simulate', lambda: run(arguments), ', '.join(outputs))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,106 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The rooms of the package: who may use whom, and who may know ROS."""
+
+import ast
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+ROOT = Path(__file__).parents[1] / 'dm_ros'
+FLOORS = [   # from the ground up; a file of the package itself is a room of its own
+    {'mechanism'}, {'motion'}, {'settings'}, {'files'}, {'ros'}, {'tools', 'testing'},
+    {'__init__', 'bias', 'energy'}]
+KNOW_ROS = {'ros', 'tools', 'testing'}
+FILES = sorted(ROOT.rglob('*.py'))
+
+
+def room(path):
+    """Return the room of a file of the package."""
+    first, *rest = path.relative_to(ROOT).parts
+    return first if rest else Path(first).stem
+
+
+def floor(name):
+    """Return on which floor a room is."""
+    return next(n for n, rooms in enumerate(FLOORS) if name in rooms)
+
+
+def imports(path):
+    """Return the names of all modules that a file imports anywhere in it."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f'{path}: a relative import'
+            names |= {f'{node.module}.{alias.name}' for alias in node.names}
+    return names
+
+
+def own(path):
+    """Return the files of the package that a file imports."""
+    found = set()
+    for name in imports(path):
+        if name.split('.')[0] != 'dm_ros':
+            continue
+        parts = name.split('.')[1:]
+        for end in (len(parts), len(parts) - 1):   # what is imported from a module, too
+            base = ROOT.joinpath(*parts[:end])
+            if base.with_suffix('.py').is_file() and end:
+                found.add(base.with_suffix('.py'))
+                break
+            if (base / '__init__.py').is_file():
+                found.add(base / '__init__.py')
+                break
+        else:
+            raise AssertionError(f'{path}: {name} is nowhere')
+    return found
+
+
+def module(path):
+    """Return the full name of the module of a file."""
+    return '.'.join(path.relative_to(ROOT.parent).with_suffix('').parts).removesuffix('.__init__')
+
+
+def test_every_file_is_in_a_room_that_is_known():
+    assert {room(path) for path in FILES} == set().union(*FLOORS)
+    assert len(FILES) > 40
+
+
+def test_only_the_rooms_of_ros_import_it():
+    ros = {path for path in FILES
+           if any(name.split('.')[0] == 'rclpy' or '_msgs' in name or name.startswith('std_srvs')
+                  for name in imports(path))}
+    assert {room(path) for path in ros} <= KNOW_ROS
+    assert ROOT / 'ros' / 'node.py' in ros
+
+
+def test_what_is_not_of_ros_loads_without_it():
+    modules = [module(path) for path in FILES if room(path) not in KNOW_ROS]
+    code = (f'import sys, {", ".join(modules)}\n'
+            'dm_ros.Simulation("lsd_ode").step((1, 2, 3))\n'
+            'print(*sorted(sys.modules))')
+    path = os.pathsep.join([str(ROOT.parent), *filter(None, sys.path)])
+    loaded = subprocess.run([sys.executable, '-c', code], env={**os.environ, 'PYTHONPATH': path},
+                            capture_output=True, text=True, check=True).stdout.split()
+    assert set(modules) <= set(loaded) and len(modules) > 20
+    assert not [m for m in loaded if m.startswith(('rclpy', 'rcl_', 'std_msgs', 'sensor_msgs'))]
+
+
+@pytest.mark.parametrize('path', FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_go_down_or_sideways_within_a_room(path):
+    for other in own(path):
+        assert room(other) == room(path) or floor(room(other)) < floor(room(path)), other
+
+
+def test_no_file_imports_itself_through_others():
+    graph = {path: own(path) for path in FILES}
+    while leaves := [path for path, others in graph.items() if not others & graph.keys()]:
+        for path in leaves:
+            del graph[path]
+    assert not graph, sorted(map(str, graph))
