@@ -15,11 +15,12 @@ import numpy as np
 from reference import slip_shares, three_shafts
 from scipy.integrate import solve_ivp
 
+from dm_ros.mechanism import clutched
 from dm_ros.mechanism.parameters import SymmetricParameters
 from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE
+from dm_ros.mechanism.self_locking import SelfLockingOde
 from dm_ros.mechanism.symmetric import kinematics, SymmetricOde
-from dm_ros.motion.steppers import held_torque_propagator
-from dm_ros.tools.comparison.reference import ClutchMotion
+from dm_ros.motion.exponentials import held_propagator
 
 try:
     import mujoco
@@ -47,13 +48,27 @@ def is_symmetric(p):
     return isinstance(p, SymmetricParameters)
 
 
+class Clutches:
+    """The equations of a self-locking differential, as this package has them."""
+
+    def __init__(self, p):
+        self._coefficients = {d: clutched.coefficients(p, SelfLockingOde(p).response(d))
+                              for d in (DIRECT, REVERSE)}
+        self._preload = clutched.full_friction(p)[1]
+
+    def under(self, T, direction=DIRECT):
+        """Return the function (w, s) -> point of ``clutched`` under held torques."""
+        k = self._coefficients[direction]
+        u = clutched.held(k, T, self._preload)
+        return lambda w, s: clutched.evaluate(k, u, w, s)
+
+
 class MatrixPair:
     """Phi x + Gamma u in numpy, without index and losses, and no more than that."""
 
     def __init__(self, p, dt):
         response = SymmetricOde(lossless(p)).response(DIRECT)
-        self._Phi, self._Gamma, _, _ = held_torque_propagator(
-            response.A, response.B[:, [2, 0, 1]], dt)
+        self._Phi, self._Gamma, _, _ = held_propagator(response.A, response.B, dt)
         self._x = np.zeros(2)
 
     def rows(self, load):
@@ -100,17 +115,17 @@ class SolveIvp:
         def right_side(T, direction):
             ((a, b), (c, d)), (e, f) = matrices[direction]
             T_3, T_1, T_2 = T
-            u = e[0] * T_1 + e[1] * T_2 + e[2] * T_3
-            v = f[0] * T_1 + f[1] * T_2 + f[2] * T_3
+            u = e[0] * T_3 + e[1] * T_1 + e[2] * T_2
+            v = f[0] * T_3 + f[1] * T_1 + f[2] * T_2
             return lambda t, y: (a * y[0] + b * y[1] + u, c * y[0] + d * y[1] + v)
         return right_side
 
     def _clutch(self, p):
-        motion = ClutchMotion(p)
+        clutches = Clutches(p)
 
         def right_side(T, direction):
-            slope = motion.slope(T, direction, motion.full_friction)
-            return lambda t, y: slope(float(y[0]), float(y[1]))[:2]
+            point = clutches.under(T, direction)
+            return lambda t, y: point(float(y[0]), float(y[1]))[:2]
         return right_side
 
     def rows(self, load):
@@ -147,7 +162,7 @@ class Control:
         self._systems, self._state, self._direction = {}, np.zeros(2), DIRECT
         for direction in (DIRECT, REVERSE):
             response = SymmetricOde(p).response(direction)
-            Phi, Gamma, _, _ = held_torque_propagator(response.A, response.B[:, [2, 0, 1]], dt)
+            Phi, Gamma, _, _ = held_propagator(response.A, response.B, dt)
             self._systems[direction] = control.ss(Phi, Gamma, kinematics(p), np.zeros((5, 3)), dt)
 
     def rows(self, load):
@@ -217,7 +232,7 @@ class TwoHinges:
         self.model = mujoco.MjModel.from_xml_string(xml)
         self.data = mujoco.MjData(self.model)
         self._friction = friction
-        self._motion = None if friction is None else ClutchMotion(p)
+        self._clutches = None if friction is None else Clutches(p)
         self._a = slip_shares(p)
 
     def _xml(self, p, dt, integrator):
@@ -263,30 +278,30 @@ class TwoHinges:
         """Return the function (w, s) of the speeds now, and one that applies the clutches."""
         side, (a_1, a_2) = self._side, self._a
 
-        def apply(force, slope):
+        def apply(force, point):
             w, s = qvel.tolist()
-            *_, F_1, F_2 = slope(w, side * s)
+            _, _, F_1, F_2, *_ = point(w, side * s)
             force[1] -= side * (a_1 * F_1 - a_2 * F_2)
         return apply
 
     def _run_with_friction(self, rows):
-        step, model, data, motion = mujoco.mj_step, self.model, self.data, self._motion
+        step, model, data, clutches = mujoco.mj_step, self.model, self.data, self._clutches
         applied, apply = data.qfrc_applied, self._slip(data.qvel)
         if self._friction == 'before':
             for row, T in rows:
-                slope = motion.slope(T, DIRECT, motion.full_friction)
+                point = clutches.under(T)
                 applied[:] = row
-                apply(applied, slope)
+                apply(applied, point)
                 step(model, data)
             return
-        passive, slope = data.qfrc_passive, None
+        passive, point = data.qfrc_passive, None
 
         def callback(model, data):
-            apply(passive, slope)
+            apply(passive, point)
         mujoco.set_mjcb_passive(callback)
         try:
             for row, T in rows:
-                slope = motion.slope(T, DIRECT, motion.full_friction)
+                point = clutches.under(T)
                 applied[:] = row
                 step(model, data)
         finally:
@@ -365,9 +380,9 @@ class AllHinges(TwoHinges):
         return self.data.qvel.tolist()[:3]
 
     def _slip(self, qvel):
-        def apply(force, slope):
+        def apply(force, point):
             w_0, w_1, w_2, *_ = qvel.tolist()
-            *_, F_1, F_2 = slope(w_0, w_1 - w_2)
+            _, _, F_1, F_2, *_ = point(w_0, w_1 - w_2)
             force[0] += F_1 + F_2
             force[1] -= F_1
             force[2] -= F_2

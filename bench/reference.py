@@ -44,7 +44,7 @@ def clutch_trajectory(p, load, dt, lagged=False):
     :param lagged: the friction knows |M| of the preceding tick alone, as in variant 1.
     """
     exact = exact_self_locking(p, load, dt, frozen=(0.0, 0.0) if lagged else None)
-    return Trajectory(exact.speed, None, exact.index)
+    return Trajectory(exact.speed, None, exact.power_flow)
 
 
 def symmetric_trajectory(p, load, dt):
@@ -53,7 +53,7 @@ def symmetric_trajectory(p, load, dt):
     for direction in (DIRECT, REVERSE):
         response = SymmetricOde(p).response(direction)
         Z = np.zeros((7, 7), np.longdouble)   # of (omega_1, omega_2, their angles, torques)
-        Z[:2, :2], Z[:2, 4:] = response.A, response.B[:, [2, 0, 1]]
+        Z[:2, :2], Z[:2, 4:] = response.A, response.B
         Z[2:4, :2] = np.eye(2)
         steps[direction] = exponential(Z * dt)[:4]
     state, direction = np.zeros(4, np.longdouble), DIRECT

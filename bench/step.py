@@ -22,8 +22,8 @@ from peers import AllHinges, Control, lossless, MatrixPair, SolveIvp, TwoHinges,
 from reference import clutch_trajectory, largest_error, symmetric_trajectory, trajectory_of
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters
-from dm_ros.mechanism.loads import profile
-from dm_ros.motion.models import VARIANTS
+from dm_ros.energy import AuditedSimulation
+from dm_ros.mechanism.variants import CATALOGUE, MECHANISMS, SYMMETRIC
 from dm_ros.tools.progress import progress
 
 DT = 1e-3            # s, of the cost table
@@ -40,7 +40,8 @@ over the ticks, of the median over the passes of one and the same tick. `error` 
 at any tick, of the carrier's and the outputs' speeds and of the slip omega_1 - omega_2, beside
 the exact solution under held torques.
 
-- step: `Simulation.step`, with the snapshot. bare: `Simulation.advance`, without.
+- step: `Simulation.step`, with the snapshot. bare: `Simulation.advance`, without. With books:
+  `AuditedSimulation.step`, which tells where the energy of the tick went.
 - lossless: the numpy pair and MuJoCo know no efficiencies; in their yardstick all are 1.
 - numpy matvec pair: Phi x + Gamma u and no more, without the index of power flow.
 - python-control: `dynamics` and `output` of a discrete system for each direction, with the index.
@@ -69,9 +70,9 @@ class Row(NamedTuple):
 class Ours:
     """A ``Simulation`` with the interface of the peers."""
 
-    def __init__(self, variant, method):
-        self.simulation = Simulation(variant, DT)
-        self._step = getattr(self.simulation, method)
+    def __init__(self, simulation, method):
+        self.simulation = simulation
+        self._step = getattr(simulation, method)
 
     def rows(self, load):
         return load
@@ -98,12 +99,14 @@ def all_rows():
     """Return the rows of the cost table."""
     p, q = SymmetricParameters(), SelfLockingParameters()
     rows = []
-    for method, word in (('step', 'step'), ('advance', 'bare')):
-        for variant in VARIANTS:
-            mechanism = variant.split('_')[0]
-            yardstick = variant if variant == 'lsd_lagged' else mechanism
-            rows.append(Row(f'{variant}, {word}', mechanism, yardstick,
-                            lambda v=variant, m=method: Ours(v, m), per_tick=method == 'step'))
+    for kind, method, word in ((Simulation, 'step', 'step'), (Simulation, 'advance', 'bare'),
+                               (AuditedSimulation, 'step', 'step with books')):
+        for variant in CATALOGUE.values():
+            name, mechanism = variant.name, variant.mechanism.name
+            rows.append(Row(f'{name}, {word}', mechanism,
+                            name if name == 'lsd_lagged' else mechanism,
+                            lambda v=name, m=method, k=kind: Ours(k(v, DT), m),
+                            per_tick=method == 'step'))
     rows.append(Row('symmetric: numpy matvec pair, lossless', 'symmetric', 'symmetric lossless',
                     lambda: MatrixPair(p, DT)))
     rows.append(Row('symmetric: python-control, discrete', 'symmetric', 'symmetric',
@@ -132,15 +135,16 @@ def all_rows():
 def yardsticks(loads, bar):
     """Return the exact speeds over the reference loads, by the key of the rows."""
     p, q = SymmetricParameters(), SelfLockingParameters()
-    makers = {
-        'symmetric': lambda load: symmetric_trajectory(p, load, DT),
-        'symmetric lossless': lambda load: symmetric_trajectory(lossless(p), load, DT),
-        'lsd': lambda load: clutch_trajectory(q, load, DT),
-        'lsd lossless': lambda load: clutch_trajectory(lossless(q), load, DT),
-        'lsd_lagged': lambda load: clutch_trajectory(q, load, DT, lagged=True)}
+    makers = {   # and the load of which mechanism
+        'symmetric': ('symmetric', lambda load: symmetric_trajectory(p, load, DT)),
+        'symmetric lossless': ('symmetric', lambda load: symmetric_trajectory(
+            lossless(p), load, DT)),
+        'lsd': ('lsd', lambda load: clutch_trajectory(q, load, DT)),
+        'lsd lossless': ('lsd', lambda load: clutch_trajectory(lossless(q), load, DT)),
+        'lsd_lagged': ('lsd', lambda load: clutch_trajectory(q, load, DT, lagged=True))}
     exact = {}
-    for key, make in makers.items():
-        exact[key] = make(loads['symmetric' if key.startswith('symmetric') else 'lsd']).speeds
+    for key, (mechanism, make) in makers.items():
+        exact[key] = make(loads[mechanism]).speeds
         bar.update()
     return exact
 
@@ -269,6 +273,10 @@ def print_targets(costs):
            own.worst < 300e-6)
     target('lsd_ode, step: max < 300 us, whatever else the machine does',
            f'{microseconds(own.most)} us', own.most < 300e-6)
+    for variant, most in (('symmetric_ode', 2.0), ('lsd_ode', 1.6)):
+        ratio = (costs[f'{variant}, step with books'].mean / costs[f'{variant}, step'].mean)
+        target(f'{variant}, step with books <= {most:g} times without', f'{ratio:.2f} times',
+               ratio <= most)
     for kind in ('step', 'bare'):
         for dae, ode in (('symmetric_dae', 'symmetric_ode'), ('lsd_dae', 'lsd_ode')):
             ratio = costs[f'{dae}, {kind}'].mean / costs[f'{ode}, {kind}'].mean
@@ -309,7 +317,7 @@ def print_accuracy(bar):
     """Print how exact all variants are."""
     symmetric, lsd = [], []
     for rate in (1000, 100):
-        load = [profile('symmetric')(n / rate) for n in range(10_000)]
+        load = [SYMMETRIC.load(n / rate) for n in range(10_000)]
         exact = symmetric_trajectory(SymmetricParameters(), load, 1 / rate)
         for variant in ('symmetric_ode', 'symmetric_dae'):
             got = trajectory_of(Simulation(variant, 1 / rate), load)
@@ -378,7 +386,8 @@ def main():
                         help='ticks of the reference load in a pass (default: 10000)')
     arguments = parser.parse_args()
     rows = all_rows()
-    loads = {m: [profile(m)(n * DT) for n in range(arguments.ticks)] for m in ('symmetric', 'lsd')}
+    loads = {name: [mechanism.load(n * DT) for n in range(arguments.ticks)]
+             for name, mechanism in MECHANISMS.items()}
     peers.silence()
     bar = progress(total=arguments.passes + 5 + 1 + 8, unit='run')
     exact = yardsticks(loads, bar)

@@ -9,9 +9,9 @@ from importlib import import_module
 HOMES = {
     'SelfLockingParameters': 'dm_ros.mechanism.parameters',
     'Simulation': 'dm_ros.motion.simulation',
-    'Snapshot': 'dm_ros.motion.simulation',
+    'Snapshot': 'dm_ros.motion.state',
     'SymmetricParameters': 'dm_ros.mechanism.parameters',
-    'VARIANTS': 'dm_ros.motion.simulation',
+    'VARIANTS': 'dm_ros.mechanism.variants',
 }
 __all__ = sorted(HOMES)
 

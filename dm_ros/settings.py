@@ -5,13 +5,8 @@
 
 from dataclasses import dataclass
 
-from dm_ros.mechanism.parameters import (
-    Parameters,
-    row,
-    SelfLockingParameters,
-    SymmetricParameters,
-)
-from dm_ros.motion.models import MODELS
+from dm_ros.mechanism.parameters import Parameters, row
+from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS
 from dm_ros.motion.simulation import Simulation
 
 
@@ -29,9 +24,7 @@ class NodeParameters(Parameters):
     """
 
     variant: str = row('variant', 'symmetric_ode', '', 0, 0, 'the mechanism and its formulation',
-                       kind=str, read_only=True,
-                       choices=('symmetric_ode', 'symmetric_dae',
-                                'lsd_lagged', 'lsd_ode', 'lsd_dae'))
+                       kind=str, read_only=True, choices=VARIANTS)
     mode: str = row('mode', 'realtime', '', 0, 0,
                     'what advances time: the clock, or each message on ~/torques by one tick',
                     kind=str, read_only=True, choices=('realtime', 'lockstep'))
@@ -65,11 +58,15 @@ class NodeParameters(Parameters):
         return tuple(named[f'initial_velocity.{shaft}'] for shaft in shafts)
 
 
+def tables():
+    """Return the tables of all parameters there are: those of each mechanism and of the node."""
+    return *(mechanism.parameters for mechanism in MECHANISMS.values()), NodeParameters
+
+
 def known_rows():
     """Return ``{full name: Row}`` of every parameter there is."""
     return {name: entry
-            for table in (NodeParameters, SymmetricParameters, SelfLockingParameters)
-            for name, entry in table.rows().values()}
+            for table in tables() for name, entry in table.rows().values()}
 
 
 def make_simulation(variant, values, dt=None):
@@ -80,8 +77,8 @@ def make_simulation(variant, values, dt=None):
     :param dt: length of a tick, s; None for that of the parameter ``rate``.
     """
     node = NodeParameters().changed(NodeParameters.part_of(values))
-    model = MODELS[variant][0]
+    mechanism = variant_named(variant).mechanism
     return Simulation(
-        variant, 1 / node.rate if dt is None else dt, model.parameters_type.part_of(values),
+        variant, 1 / node.rate if dt is None else dt, mechanism.parameters.part_of(values),
         substeps=node.substeps, power_flow_deadband=node.deadband,
-        initial_velocity=node.initial_velocity(model.outputs))
+        initial_velocity=node.initial_velocity(mechanism.outputs))

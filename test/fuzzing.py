@@ -4,7 +4,7 @@
 """
 Machines that do at random what users do to a differential, good and bad, in any order.
 
-``CoreMachine``  the core as the node uses it: ``Simulation``, ``TorqueInputs``, the tables
+``CoreMachine``  the core as the node uses it: ``Simulation``, ``HeldInputs``, the tables
 ``NodeMachine``  a ``DifferentialNode`` in lockstep, by its own callbacks and real publishers
 
 A sequence is one life of a machine. After each of its steps the laws of ``Laws`` hold.
@@ -33,8 +33,8 @@ from properties import constraints
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.energy import AuditedSimulation
-from dm_ros.motion.held_inputs import TorqueInputs
-from dm_ros.motion.models import MODELS
+from dm_ros.mechanism.variants import MECHANISMS
+from dm_ros.motion.held_inputs import HeldInputs
 from dm_ros.settings import NodeParameters
 from dm_ros.tools.progress import progress
 
@@ -92,8 +92,8 @@ def changes(table, wanted=lambda name: True):
     return st.lists(pair, min_size=1, max_size=3).map(dict)
 
 
-DEMANDS = {model.inputs: demands(model.inputs) for model, _ in MODELS.values()}
-TABLES = {model.parameters_type: changes(model.parameters_type) for model, _ in MODELS.values()}
+DEMANDS = {m.inputs: demands(m.inputs) for m in MECHANISMS.values()}
+TABLES = {m.parameters: changes(m.parameters) for m in MECHANISMS.values()}
 OWN = ('torque_limit', 'torque_timeout', 'power_flow_deadband', 'substeps')
 own_changes = changes(
     NodeParameters, lambda name: name in OWN or name.startswith('initial_velocity'))
@@ -148,7 +148,7 @@ class CoreMachine(RuleBasedStateMachine):
         self.rate = rate
         self.settings = NodeParameters(variant=variant, rate=rate)
         self.simulation = kind(variant, 1 / rate, initial_velocity=start)
-        self.inputs = TorqueInputs(self.simulation.inputs, self.settings.torque_limit,
+        self.inputs = HeldInputs(self.simulation.mechanism.ports, self.settings.torque_limit,
                                    self.settings.torque_timeout * rate)
         self.laws = Laws(variant)
         self.ticks, self.demand = 0, {}   # what they should be: {shaft: (torque, tick)}
@@ -272,7 +272,7 @@ class CoreMachine(RuleBasedStateMachine):
             assert math.isfinite(self.simulation.stored_energy)
             assert all(map(math.isfinite, self.simulation.total.work))
         assert snapshot.time == self.ticks * self.simulation.dt
-        self.laws.check(self.simulation.parameters, *snapshot[1:3], *snapshot[4:])
+        self.laws.check(self.simulation.parameters, *snapshot[1:3], *snapshot[4:6])
 
 
 class NodeMachine(RuleBasedStateMachine):

@@ -9,8 +9,33 @@ import math
 import numpy as np
 
 from dm_ros import SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism import clutched
+from dm_ros.mechanism.self_locking import SelfLockingOde
+from dm_ros.mechanism.variants import SYMMETRIC, variant_named
 
 BOTH = (1, -1)   # directions of power flow
+
+
+def is_symmetric(variant):
+    """Return whether a variant is one of the symmetric differential."""
+    return variant_named(variant).mechanism is SYMMETRIC
+
+
+class Flow:
+    """A self-locking differential in one direction under held torques, as ``clutched`` has it."""
+
+    def __init__(self, p, T, direction, friction=None, formulation=SelfLockingOde):
+        """Take friction that does not follow M, or None for that of the preload beside it."""
+        self.k = clutched.coefficients(p, formulation(p).response(direction), friction is None)
+        self.u = clutched.held(self.k, tuple(T), friction or clutched.full_friction(p)[1])
+
+    def point(self, w, s):
+        """Return (dw/dt, ds/dt, F_1, F_2, M_1, M_2, ...)."""
+        return clutched.evaluate(self.k, self.u, w, s)
+
+    def jacobian(self, w, s):
+        """Return (J_ww, J_ws, J_sw, J_ss) and what friction grows with."""
+        return clutched.jacobian(self.k, self.u, self.point(w, s))
 
 
 class UncheckedParameters(SelfLockingParameters):

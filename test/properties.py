@@ -13,13 +13,14 @@ import itertools
 import math
 from typing import NamedTuple
 
+from mechanisms import is_symmetric
 import numpy as np
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
-from dm_ros.mechanism import self_locking, symmetric
+from dm_ros.mechanism import clutched, self_locking, symmetric
 from dm_ros.mechanism.self_locking import SelfLockingDae
 from dm_ros.mechanism.symmetric import SymmetricDae
-from dm_ros.motion.models import MODELS
+from dm_ros.mechanism.variants import variant_named
 
 ROUNDING = 1e-14     # of the largest term of a constraint
 TORQUE_LIMIT = 1e5   # N m
@@ -112,7 +113,7 @@ def random_case(n):
     """Return case n; the variants take turns."""
     rng = np.random.default_rng([3, n])
     variant = VARIANTS[n % len(VARIANTS)]
-    parameters = (symmetric_parameters if variant.startswith('symmetric')
+    parameters = (symmetric_parameters if is_symmetric(variant)
                   else self_locking_parameters)(rng)
     rate = float(rng.choice([100.0, 1000.0, 1e4, power_of_ten(rng, 2, 4)]))
     speed = rng.choice([0.0, rng.normal(0.0, 50.0), 1e4, 1e6], p=[0.3, 0.3, 0.3, 0.1])
@@ -137,15 +138,15 @@ class Bound:
     """
 
     def __init__(self, variant, p):
-        model, formulation = MODELS[variant]
+        formulation = variant_named(variant).formulation
         self._lagged = variant == 'lsd_lagged'
         self._phi, self._preload = (0.0, 0.0), (0.0, 0.0)
         inertia = [p.I_0, p.I_1, p.I_2, p.n_s * p.I_s]
-        if model.parameters_type is SymmetricParameters:
+        if is_symmetric(variant):
             inertia.insert(3, p.I_3)
             shafts = symmetric.kinematics(p)
         else:
-            self._phi, self._preload = self_locking.full_friction(p)
+            self._phi, self._preload = clutched.full_friction(p)
             shafts = self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p))
         self._to_v = np.linalg.qr(np.sqrt(inertia)[:, None] * shafts, 'r')
         self._growth, torque, friction = 0.0, [], []
@@ -160,7 +161,7 @@ class Bound:
     def _corners(self, r):
         """Yield A, B and K of x' = A x + B T - K (friction that does not follow M)."""
         if isinstance(r, symmetric.LinearResponse):
-            yield r.A, r.B[:, [2, 0, 1]], np.zeros((2, 2))
+            yield r.A, r.B, np.zeros((2, 2))
             return
         corners = itertools.product((-1.0, 0.0, 1.0), repeat=2)
         for shares in ([(0.0, 0.0)] if self._lagged else corners):
@@ -246,7 +247,7 @@ class Tally:
 
 def constraints(variant, p):
     """Return the matrix g with g omega = 0 for the speeds of all shafts, (47), (80)."""
-    formulation = SymmetricDae if variant.startswith('symmetric') else SelfLockingDae
+    formulation = SymmetricDae if is_symmetric(variant) else SelfLockingDae
     return formulation(p).constraints()
 
 
@@ -275,7 +276,7 @@ def steady_load(variant, kind):
     """Return the torques of a period: constant, or swinging through both power flows and slip."""
     if kind == 'rest':
         return [(0.0, 0.0, 0.0)] * PERIOD
-    ratio, share = (3.517, 0.5) if variant.startswith('symmetric') else (1.0, 0.4)
+    ratio, share = (3.517, 0.5) if is_symmetric(variant) else (1.0, 0.4)
     if kind == 'constant':
         return [(50.0 / ratio, -19.0, -28.0)] * PERIOD
     torques = []
@@ -283,7 +284,7 @@ def steady_load(variant, kind):
         phase = 2 * math.pi * n / PERIOD
         drive = 200.0 * math.sin(2 * phase) + 80.0 * math.sin(5 * phase + 0.5)
         load = 3.0 + 15.0 * math.sin(phase + 1.5) - drive
-        front = share + (0.01 if variant.startswith('symmetric') else 0.28) * math.sin(3 * phase)
+        front = share + (0.01 if is_symmetric(variant) else 0.28) * math.sin(3 * phase)
         torques.append((drive / ratio, front * load, (1.0 - front) * load))
     return torques
 

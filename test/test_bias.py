@@ -13,7 +13,7 @@ import pytest
 
 from dm_ros import SelfLockingParameters, Simulation
 from dm_ros.bias import friction_for, torque_bias
-from dm_ros.mechanism.self_locking import slip_steepness
+from dm_ros.mechanism.clutched import slip_steepness
 from dm_ros.tools.bias import main
 
 

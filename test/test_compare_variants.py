@@ -14,13 +14,14 @@ from dm_ros import VARIANTS
 from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
 from dm_ros.mechanism.self_locking import balance, SelfLockingDae, SelfLockingOde
 from dm_ros.mechanism.symmetric import SymmetricDae
+from dm_ros.mechanism.variants import CATALOGUE, MECHANISMS, SELF_LOCKING, SYMMETRIC, variants_of
 from dm_ros.tools import compare_variants
 from dm_ros.tools.comparison import measures as measures
 from dm_ros.tools.comparison import page as comparison_page
 from dm_ros.tools.comparison.claims import SILENT
 from dm_ros.tools.comparison.figures import FIGURES
 from dm_ros.tools.comparison.reference import exact_self_locking, exact_symmetric
-from dm_ros.tools.comparison.runs import Load, MECHANISMS, RATES, run, ticks_of, variants_of
+from dm_ros.tools.comparison.runs import Load, RATES, run, ticks_of
 
 
 @pytest.fixture(autouse=True)
@@ -40,8 +41,9 @@ def runs():
             start = round(1.2 * rate)
             return Load(self.mechanism, 1.2 + self.seconds).held(rate)[start:]
 
-    return {'symmetric': run('symmetric', Load('symmetric', 0.6), {}, lambda n=1: None),
-            'lsd': run('lsd', ToSlipAndLock('lsd', 1.1), {}, lambda n=1: None)}
+    return {SYMMETRIC: run(SYMMETRIC, Load(SYMMETRIC, 0.6), {}, lambda n=1: None),
+            SELF_LOCKING: run(SELF_LOCKING, ToSlipAndLock(SELF_LOCKING, 1.1), {},
+                              lambda n=1: None)}
 
 
 class Page(HTMLParser):
@@ -112,7 +114,7 @@ def test_own_load_and_parameters_are_taken_and_named():
     page = Page(page_in('comparison'))
     for words in ('IN.csv, the first 0.1 of 9 s', 'own.yaml', 'lsd.clutch.rear.preload 50'):
         assert words in page.text
-    assert set(page.images) == {name for name, row in FIGURES.items() if row[0] == 'lsd'}
+    assert set(page.images) == {name for name, row in FIGURES.items() if row[0] is SELF_LOCKING}
     assert 'symmetric_ode' not in page.text
 
 
@@ -164,7 +166,7 @@ def test_a_failed_run_leaves_the_page_before_as_it_is():
 
 
 def test_the_progress_bar_ends_where_it_said():
-    for mechanism in MECHANISMS:
+    for mechanism in MECHANISMS.values():
         load, done = Load(mechanism, 0.05), []
         run(mechanism, load, {}, lambda n=1, done=done: done.append(n))
         assert sum(done) == ticks_of(mechanism, load)
@@ -175,8 +177,8 @@ def test_sizes_in_the_table_are_those_of_the_equations():
     sizes = {'symmetric_ode': 2, 'symmetric_dae': len(SymmetricDae(p).system(1)[0]),
              'lsd_lagged': len(balance(q, 1)[0]), 'lsd_ode': len(SelfLockingOde(q).system(1)[0]),
              'lsd_dae': len(SelfLockingDae(q).system(1)[0])}
-    assert {v: nature.matrix for v, nature in comparison_page.NATURES.items()} == sizes
-    assert all(len(n.unknowns.split()) == n.matrix for n in comparison_page.NATURES.values())
+    assert {name: len(v.unknowns.split()) for name, v in CATALOGUE.items()} == sizes
+    assert comparison_page.GIVEN.keys() == sizes.keys()
 
 
 def test_exact_solution_of_the_symmetric_one_does_not_depend_on_the_tick():
@@ -195,53 +197,49 @@ def test_exact_solution_of_the_self_locking_one_does_not_depend_on_the_tick():
 
 def test_symmetric_variants_are_identical_and_switch_together(runs):
     for rate in RATES:
-        ode, dae = (runs['symmetric'].records[v, rate] for v in variants_of('symmetric'))
-        assert np.abs(ode.main_speeds() - dae.main_speeds()).max() < 1e-9
-        assert (ode.index == dae.index).all()
+        ode, dae = (runs[SYMMETRIC].records[v, rate] for v in variants_of(SYMMETRIC))
+        assert np.abs(measures.three_speeds(ode) - measures.three_speeds(dae)).max() < 1e-9
+        assert (ode.power_flow == dae.power_flow).all()
 
 
 def test_variants_2_and_3_are_the_exact_solution_at_every_rate(runs):
+    lsd = runs[SELF_LOCKING]
     for variant in ('lsd_ode', 'lsd_dae'):
         for rate in RATES:
-            d = measures.difference(runs['lsd'].records[variant, rate], runs['lsd'].exact[rate])
+            d = measures.difference(lsd.records[variant, rate], lsd.exact[rate])
             assert d.speed < 2e-3 and d.other_index == 0
-    ode, dae = (runs['lsd'].records[v, 1000] for v in ('lsd_ode', 'lsd_dae'))
-    assert np.abs(ode.main_speeds() - dae.main_speeds()).max() < 1e-9
+    ode, dae = (lsd.records[v, 1000] for v in ('lsd_ode', 'lsd_dae'))
+    assert np.abs(measures.three_speeds(ode) - measures.three_speeds(dae)).max() < 1e-9
 
 
 def test_error_of_the_lagged_variant_falls_with_the_step_and_it_meets_its_own_yardstick(runs):
     errors = []
     for rate in RATES:
-        record = runs['lsd'].records['lsd_lagged', rate]
-        errors.append(measures.difference(record, runs['lsd'].exact[rate]).speed_rms)
-        assert measures.difference(record, runs['lsd'].frozen[rate]).speed < 1e-3
+        record = runs[SELF_LOCKING].records['lsd_lagged', rate]
+        errors.append(measures.difference(record, runs[SELF_LOCKING].exact[rate]).speed_rms)
+        assert measures.difference(record, runs[SELF_LOCKING].frozen[rate]).speed < 1e-3
     assert errors[0] > 5 * errors[1] > 25 * errors[2]
 
 
 def test_lagged_moments_lag_by_a_tick_or_more_in_sliding_while_speeds_are_good(runs):
-    record, exact = runs['lsd'].records['lsd_lagged', 1000], runs['lsd'].exact[1000]
+    record, exact = runs[SELF_LOCKING].records['lsd_lagged', 1000], runs[SELF_LOCKING].exact[1000]
     lag = measures.lags(record, exact, 1000)
     front_mesh, rear_mesh, front_clutch, rear_clutch = lag
     assert abs(front_mesh) < 0.3 and 0.5 < rear_mesh < 1.0
     assert 0.9 < front_clutch < 1.3 and 1.3 < rear_clutch < 2.0
     assert measures.difference(record, exact).relative_speed < 1e-3
-    ode = measures.lags(runs['lsd'].records['lsd_ode', 1000], exact, 1000)
+    ode = measures.lags(runs[SELF_LOCKING].records['lsd_ode', 1000], exact, 1000)
     assert np.abs(ode).max() < 0.01
 
 
 def test_the_lag_of_a_shifted_signal_is_found():
     class Shifted:
-        index = np.ones(400)
-        time = np.arange(400)
-
-        def moments(self):
-            return np.sin((self.time[:, None] - 1.6) / 20)
-
-        def slip(self):
-            return np.full(400, 50.0)
+        power_flow = np.ones(400)
+        moment = {'mesh': np.sin((np.arange(400) - 1.6) / 20)}
+        slip = np.full(400, 50.0)
 
     class Exact:
-        index = np.ones(400)
+        power_flow = np.ones(400)
         speed = np.array([[0.0, 50.0, 0.0]] * 400)
         moment = np.sin(np.arange(400)[:, None] / 20)
 
@@ -249,16 +247,16 @@ def test_the_lag_of_a_shifted_signal_is_found():
 
 
 def test_gear_moments_are_near_40_to_60(runs):
-    shares, _ = measures.gear_share(runs['lsd'].records['lsd_ode', 1000])
+    shares, _ = measures.gear_share(runs[SELF_LOCKING].records['lsd_ode', 1000])
     assert np.median(shares) == pytest.approx(0.4, abs=0.02)
 
 
 def test_it_locks_and_without_proportional_friction_the_shafts_run_apart(runs):
-    with_, without = runs['lsd'].records['lsd_ode', 1000], runs['lsd'].without
-    locked = np.abs(with_.slip()) < measures.LOCKED
+    with_, without = runs[SELF_LOCKING].records['lsd_ode', 1000], runs[SELF_LOCKING].without
+    locked = np.abs(with_.slip) < measures.LOCKED
     assert measures.longest_stretch(locked) > 20
     assert np.abs(without.moment['rear_clutch']).max() < 32.5   # the preload
-    assert np.abs(without.slip()).max() > 1.2 * np.abs(with_.slip()).max()
+    assert np.abs(without.slip).max() > 1.2 * np.abs(with_.slip).max()
 
 
 def test_every_statement_of_the_paper_gets_a_number_and_a_verdict(runs):

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters
-from dm_ros.mechanism.loads import profile
+from dm_ros.mechanism.variants import variant_named
 
 if os.environ.get('CI'):   # there it must not be skipped
     import mujoco
@@ -149,7 +149,8 @@ def our_run(variant, p, load, substeps):
 
 def held(variant):
     """Return the torques of each tick."""
-    return [profile(variant)(n * TICK) for n in range(round(SECONDS / TICK))]
+    load = variant_named(variant).mechanism.load
+    return [load(n * TICK) for n in range(round(SECONDS / TICK))]
 
 
 def largest(run, other):
@@ -228,7 +229,7 @@ class TestSelfLockingWithPreloadAlone:
 
 
 def test_a_wrong_inertia_would_show():
-    p, load = SYMMETRIC['defaults'], held('symmetric')
+    p, load = SYMMETRIC['defaults'], held('symmetric_ode')
     wrong = dataclasses.replace(p, I_s=1.01 * p.I_s)
     run = mujoco_run(symmetric_rotors(p, 1.25e-4, 'RK4'), load)
     assert largest(run, our_run('symmetric_ode', wrong, load, 1))[0] > 0.01

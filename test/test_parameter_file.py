@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dm_ros import SelfLockingParameters, SymmetricParameters
 from dm_ros.files.parameter_file import default_text, read_parameter_file
+from dm_ros.mechanism.variants import SELF_LOCKING, SYMMETRIC
 from dm_ros.settings import NodeParameters
 
 CONFIG = Path(__file__).parent.parent / 'config'
-FILES = {'symmetric.yaml': SymmetricParameters, 'lsd.yaml': SelfLockingParameters}
+FILES = {'symmetric.yaml': SYMMETRIC, 'lsd.yaml': SELF_LOCKING}
 
 
 @pytest.fixture
@@ -25,28 +25,29 @@ def read(tmp_path):
     return read
 
 
-@pytest.mark.parametrize('name, table', FILES.items())
-def test_default_files_are_what_the_tables_say(name, table):
-    assert (CONFIG / name).read_text() == default_text(table)
-    assert read_parameter_file(CONFIG / name) == table().named()
+@pytest.mark.parametrize('name, mechanism', FILES.items())
+def test_default_files_are_what_the_tables_say(name, mechanism):
+    assert (CONFIG / name).read_text() == default_text(mechanism)
+    assert read_parameter_file(CONFIG / name) == mechanism.parameters().named()
 
 
-@pytest.mark.parametrize('table', FILES.values())
-def test_default_files_mean_the_same_to_other_yaml_readers(table):
+@pytest.mark.parametrize('mechanism', FILES.values())
+def test_default_files_mean_the_same_to_other_yaml_readers(mechanism):
     def flat(tree, prefix=''):
         for name, value in tree.items():
             if isinstance(value, dict):
                 yield from flat(value, f'{prefix}{name}.')
             else:
                 yield prefix + name, value
-    tree = yaml.safe_load(default_text(table))
-    assert dict(flat(tree['/**']['ros__parameters'])) == table().named()
+    tree = yaml.safe_load(default_text(mechanism))
+    assert dict(flat(tree['/**']['ros__parameters'])) == mechanism.parameters().named()
 
 
-@pytest.mark.parametrize('table', FILES.values())
-def test_default_files_mark_every_assumed_value(table):
-    assumed = [row for _, row in table.rows().values() if 'assumed' in row.description]
-    assert default_text(table).count('(assumed') == len(assumed)
+@pytest.mark.parametrize('mechanism', FILES.values())
+def test_default_files_mark_every_assumed_value(mechanism):
+    rows = mechanism.parameters.rows().values()
+    assumed = [row for _, row in rows if 'assumed' in row.description]
+    assert default_text(mechanism).count('(assumed') == len(assumed)
 
 
 def test_names_are_nested_dotted_or_mixed(read):

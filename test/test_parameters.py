@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from dm_ros import SelfLockingParameters, SymmetricParameters
-from dm_ros.mechanism.self_locking import full_friction, SelfLockingOde
+from dm_ros.mechanism.clutched import full_friction
+from dm_ros.mechanism.self_locking import SelfLockingOde
 from dm_ros.settings import NodeParameters
 
 TABLE_1 = {

@@ -89,7 +89,7 @@ def exact_symmetric(p, load, dt):
     steps = {}
     for direction in (DIRECT, REVERSE):
         response = SymmetricOde(p).response(direction)
-        Z = np.zeros((7, 7), np.longdouble)   # of speeds, angles, (T_1, T_2, T_3)
+        Z = np.zeros((7, 7), np.longdouble)   # of speeds, angles, (T_3, T_1, T_2)
         Z[:2, :2], Z[:2, 4:], Z[2:4, :2] = response.A, response.B, np.eye(2)
         steps[direction] = exponential(Z * np.longdouble(dt))[:4]
     state, direction, states = np.zeros(4, np.longdouble), DIRECT, []
@@ -98,7 +98,7 @@ def exact_symmetric(p, load, dt):
         drive, output = abs(T_3 * w_3), abs(T_1 * w_1 + T_2 * w_2)
         if drive or output:
             direction = DIRECT if drive > output else REVERSE
-        state = steps[direction] @ np.array([*state, T_1, T_2, T_3], np.longdouble)
+        state = steps[direction] @ np.array([*state, T_3, T_1, T_2], np.longdouble)
         states.append(state)
     return np.array(states)
 

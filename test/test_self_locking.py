@@ -8,6 +8,7 @@ import math
 
 from mechanisms import (
     BOTH,
+    Flow,
     lossless,
     mirrored_self_locking,
     random_self_locking,
@@ -22,15 +23,10 @@ import pytest
 from scipy.optimize import brentq
 
 from dm_ros import SelfLockingParameters
-from dm_ros.mechanism import self_locking
-from dm_ros.mechanism.self_locking import (
-    SelfLockingDae,
-    SelfLockingLagged,
-    SelfLockingOde,
-    solve_moments,
-)
+from dm_ros.mechanism import losses, self_locking
+from dm_ros.mechanism.clutched import full_friction, solve_moments
+from dm_ros.mechanism.self_locking import SelfLockingDae, SelfLockingLagged, SelfLockingOde
 from dm_ros.motion.models import SelfLockingModel
-from dm_ros.motion.steppers import ClutchStep
 
 FORMULATIONS = [SelfLockingLagged, SelfLockingOde, SelfLockingDae]
 IDENTITY = 1e-12   # relative: rounding
@@ -60,11 +56,6 @@ def answer(formulation, p, direction, w, T, F):
     """Return (e_0, e_1, e_2, e_s) and (M_1, M_2) under given clutch moments."""
     r, y = formulation(p).response(direction), slip_state(p, w)
     return all_accelerations(p, r.A @ y + r.B @ T - r.C @ F), r.P @ y + r.Q @ T - r.W @ F
-
-
-def stepper(p, formulation=SelfLockingOde):
-    return ClutchStep({d: formulation(p).response(d) for d in BOTH},
-                      self_locking.slip_steepness(p), self_locking.full_friction(p))
 
 
 def viscous_moments(p, w):
@@ -159,16 +150,15 @@ def test_power_of_the_torques_is_stored_or_lost(direction):
     for p, w, T, F in cases():
         e, (M_1, M_2) = answer(SelfLockingOde, p, direction, w, T, F)
         w_0, w_1, w_2, _ = self_locking_speeds(p, *w)
-        L_0, L_1, L_2, _ = viscous_moments(p, w)
+        y = slip_state(p, w)
         kinetic = (self_locking_energy(p, *(w + e[1:3]))
                    - self_locking_energy(p, *(w - e[1:3]))) / 2
-        friction = F[0] * (w_1 - w_0) + F[1] * (w_2 - w_0)
-        bearing = (1 / p.eta_0B - 1) * w_0 * (
-            L_0 - L_1 - L_2 - F[0] - F[1] + (M_1 + M_2 if direction == 1 else -T[0]))
-        gears = (1 - p.eta_1G) * M_1 * w_1 + (1 - p.eta_2G) * M_2 * w_2
-        lost = 2 * self_locking_dissipation(p, *w) + friction + bearing + gears
-        scale = np.abs(T * (w_0, w_1, w_2)).sum() + abs(kinetic) + abs(friction)
-        assert abs(T @ (w_0, w_1, w_2) - kinetic - lost) < IDENTITY * scale
+        lost = losses.self_locking(
+            losses.self_locking_losses(p, direction), y[0]**2, y[0] * y[1], y[1]**2,
+            *np.outer([*F, M_1, M_2], y).ravel(), T[0] * w_0)
+        assert lost[0] == pytest.approx(2 * self_locking_dissipation(p, *w), rel=1e-12)
+        scale = np.abs(T * (w_0, w_1, w_2)).sum() + abs(kinetic) + np.abs(lost).sum()
+        assert abs(T @ (w_0, w_1, w_2) - kinetic - sum(lost)) < IDENTITY * scale
 
 
 # The clutch friction
@@ -179,12 +169,10 @@ def random_flows(direction, count, seed):
     rng = np.random.default_rng(seed)
     for _ in range(count // 20):
         p = random_self_locking(rng)
-        step = stepper(p)
         for _ in range(20):
             T = rng.normal(0, 300, 3)
             w = rng.normal(0, 30) + rng.normal(0, 1, 2) * 10.0 ** rng.uniform(-3, 1)
-            slope, _ = step.flow(tuple(T), direction)
-            yield p, w, T, slope(*slip_state(p, w))[:6]
+            yield p, w, T, Flow(p, T, direction).point(*slip_state(p, w))[:6]
 
 
 @pytest.mark.parametrize('direction', BOTH)
@@ -208,8 +196,8 @@ def test_friction_opposes_the_slip_of_each_shaft_against_the_carrier(direction):
 @pytest.mark.parametrize('direction', BOTH)
 def test_reversal_of_all_torques_and_speeds_reverses_the_flow(direction):
     for p, w, T, flow in random_flows(direction, 1000, seed=5):
-        slope, _ = stepper(p).flow(tuple(-T), direction)
-        assert relative_difference(slope(*slip_state(p, -w))[:6], np.negative(flow)) < IDENTITY
+        reversed_ = Flow(p, -T, direction).point(*slip_state(p, -w))[:6]
+        assert relative_difference(reversed_, np.negative(flow)) < IDENTITY
 
 
 def matching_patterns(z, W, x):
@@ -240,7 +228,7 @@ def test_exactly_one_sign_pattern_of_the_moments_matches_and_is_found(direction)
 @pytest.mark.parametrize('direction', BOTH)
 def test_moments_solve_their_equation_also_where_they_vanish(direction):
     p = SelfLockingParameters()
-    W, (phi, _) = SelfLockingOde(p).response(direction).W, self_locking.full_friction(p)
+    W, (phi, _) = SelfLockingOde(p).response(direction).W, full_friction(p)
     x = np.array([1, -1]) * phi
     for M in ([0.0, 0.0], [0.0, 5.0], [-5.0, 0.0]):
         z = M + W @ (x * np.abs(M))
@@ -250,25 +238,25 @@ def test_moments_solve_their_equation_also_where_they_vanish(direction):
 @pytest.mark.parametrize('direction', BOTH)
 def test_lagged_friction_is_that_of_the_given_moments(direction):
     for p, w, T, _ in random_flows(direction, 200, seed=7):
-        model, before = SelfLockingModel(SelfLockingLagged, p, 1e-3), (12.0, -34.0, 0.0, 0.0)
-        x = tuple(slip_state(p, w))
-        _, _, memory, _ = model.step(x, before, tuple(T), direction)
-        end = model.step(x, before, tuple(T), direction)[0]
+        model, before = SelfLockingModel(SelfLockingLagged, p, 1e-3), (12.0, 34.0)
+        _, _, end, _, point, _, _ = model.step(
+            tuple(slip_state(p, w)), before, tuple(T), direction)
         g = p.R_2 / p.R_1
         w_end = end[0] + g / (1 + g) * end[1], end[0] - end[1] / (1 + g)
         F = [f_k * (abs(M_k) * math.tan(p.alpha) + p.n_s * N_k * R_k) for f_k, M_k, N_k, R_k
-             in zip(friction_factors(p, w_end), before[:2], (p.N_1, p.N_2), (p.R_1, p.R_2),
+             in zip(friction_factors(p, w_end), before, (p.N_1, p.N_2), (p.R_1, p.R_2),
                     strict=True)]
         _, M = answer(SelfLockingOde, p, direction, w_end, T, F)
-        assert memory == pytest.approx((*M, *F), rel=1e-9, abs=1e-9 * np.abs(T).max())
+        assert point[2:6] == pytest.approx((*F, *M), rel=1e-9, abs=1e-9 * np.abs(T).max())
+        assert model.remembered(point) == (abs(point[4]), abs(point[5]))
 
 
 @pytest.mark.parametrize('direction', BOTH)
 def test_gears_part_the_torque_40_to_60_while_the_slip_stays(direction):
     p = SelfLockingParameters()
-    slope, _ = stepper(p).flow((300.0, -100.0, -200.0), direction)
-    slip = brentq(lambda s: slope(10.0, s)[1], -1, 1)
-    *_, F_1, F_2, M_1, M_2 = slope(10.0, slip)[:6]
+    flow = Flow(p, (300.0, -100.0, -200.0), direction)
+    slip = brentq(lambda s: flow.point(10.0, s)[1], -1, 1)
+    *_, F_1, F_2, M_1, M_2 = flow.point(10.0, slip)[:6]
     assert min(abs(F_1), abs(F_2)) > 1 and abs(slip) > 1e-3
     assert M_1 / (M_1 + M_2) == pytest.approx(0.4, abs=1e-3)
 

@@ -15,7 +15,7 @@ import pytest
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.files.torque_table import read_torque_file, TorqueTable
-from dm_ros.mechanism.loads import profile
+from dm_ros.mechanism.variants import variant_named
 from dm_ros.tools.simulate import main
 
 GOOD = 'time,pinion,left,right\n0,10,-15,-16\n0.5,-10,15,16\n1,0,0,0\n'
@@ -45,7 +45,7 @@ def write_profile(variant, seconds=5.0):
     with open('IN.csv', 'w') as file:
         print('time', *Simulation(variant).inputs, sep=',', file=file)
         for n in range(round(seconds * 100) + 1):
-            print(n / 100, *profile(variant)(n / 100), sep=',', file=file)
+            print(n / 100, *variant_named(variant).mechanism.load(n / 100), sep=',', file=file)
 
 
 @pytest.mark.parametrize('variant', VARIANTS)
@@ -53,8 +53,8 @@ def test_output_is_what_the_library_computes(variant):
     write_profile(variant, 1.0)
     assert simulate('--out', 'OUT.csv', '--dt', '0.01', variant=variant) == 0
     simulation = Simulation(variant, 0.01)
-    snapshots = [simulation.snapshot()]
-    snapshots += [simulation.step(profile(variant)(n / 100)) for n in range(100)]
+    load = simulation.mechanism.load
+    snapshots = [simulation.snapshot(), *(simulation.step(load(n / 100)) for n in range(100))]
     rows = np.array([np.hstack(snapshot) for snapshot in snapshots])
     with open('OUT.csv') as file:
         header = file.readline()

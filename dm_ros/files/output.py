@@ -1,24 +1,10 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the tools write: the columns of a record, and files that are whole or not there."""
+"""Files that are whole or not there."""
 
 from contextlib import contextmanager
 import os
-
-
-def column_names(simulation):
-    """Return the names of the columns of a record, as in OUT.csv."""
-    return ['time', *(f'velocity.{name}' for name in simulation.shafts),
-            *(f'position.{name}' for name in simulation.shafts),
-            *(f'torque.{name}' for name in simulation.inputs),
-            *(f'moment.{name}' for name in simulation.moments), 'power_flow']
-
-
-def as_row(snapshot):
-    """Return a ``Snapshot`` as one flat tuple in the order of ``column_names``."""
-    time, velocity, position, torque, moment, power_flow = snapshot
-    return (time, *velocity, *position, *torque, *moment, power_flow)
 
 
 @contextmanager
@@ -48,11 +34,3 @@ def replacing(path, mode):
         if isinstance(error, OSError) and error.filename is None:   # as on a full disk
             raise OSError(error.errno, error.strerror, path) from None
         raise
-
-
-def write_csv(columns, path):
-    """Write ``{name: array}`` as CSV, 17 significant digits."""
-    with replacing(path, 'w') as file:
-        file.write(','.join(columns) + '\n')
-        for row in zip(*(values.tolist() for values in columns.values())):
-            file.write(','.join(f'{value:.17g}' for value in row) + '\n')

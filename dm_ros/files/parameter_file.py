@@ -14,11 +14,9 @@ import textwrap
 
 import yaml
 
-from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
-from dm_ros.settings import NodeParameters
+from dm_ros.settings import tables
 
 NODE = '/differential'
-TABLES = (SymmetricParameters, SelfLockingParameters, NodeParameters)
 TYPE_NAMES = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
               list: 'a list'}
 # what every ROS 2 node takes beside its own parameters
@@ -44,7 +42,7 @@ def read_parameter_file(path):
         for name_of_node, parameters in _sections(_documents(path)):
             if _is_for_node(name_of_node):
                 values.update(_flat(parameters))
-        for table in TABLES:
+        for table in tables():
             mine = table.part_of(values)
             for name, row in table.rows().values():
                 if name in mine:
@@ -153,7 +151,7 @@ def _check_type(name, value, kind):
 
 
 def _check_other_names(values):
-    known = {name for table in TABLES for name, _ in table.rows().values()}
+    known = {name for table in tables() for name, _ in table.rows().values()}
     for name, value in values.items():
         if name not in known and not ROS_PARAMETERS.fullmatch(name):
             raise ValueError(f'{name}: there is no such parameter')
@@ -172,16 +170,11 @@ HEADER = """\
 /**:
   ros__parameters:
 """
-TITLES = {
-    SymmetricParameters: {'title': 'symmetric differential', 'source': 'Table 1',
-                          'variant': 'symmetric_ode'},
-    SelfLockingParameters: {'title': 'self-locking differential', 'source': 'Table 2',
-                            'variant': 'lsd_ode'},
-}
 
 
-def default_text(table):
-    """Return the text of the parameter file with the defaults of a mechanism."""
+def default_text(mechanism):
+    """Return the text of the parameter file with the defaults of a ``Mechanism``."""
+    table = mechanism.parameters
     tree = {}
     for symbol, (name, row) in table.rows().items():
         *groups, leaf = name.split('.')
@@ -190,7 +183,7 @@ def default_text(table):
             branch = branch.setdefault(group, {})
         unit = '' if row.unit == '1' else f', {row.unit}'
         branch[leaf] = _number(getattr(table(), symbol)), f'{symbol}{unit}: {row.description}'
-    return HEADER.format(**TITLES[table]) + ''.join(_lines(tree, '    '))
+    return HEADER.format(**mechanism._asdict()) + ''.join(_lines(tree, '    '))
 
 
 def _lines(tree, indent):

@@ -5,36 +5,43 @@
 
 import numpy as np
 
-from dm_ros.files.output import as_row, column_names, replacing, write_csv
+from dm_ros.files.columns import as_row, column_names, write_csv
+from dm_ros.files.output import replacing
 from dm_ros.files.plot import save_plot
 
 
 class Record:
     """
-    Snapshots of a run as numpy arrays over the ticks.
+    What a differential reported in a run, as numpy arrays over the ticks.
 
     ``time`` (s) and ``power_flow`` (+1, -1) are arrays; ``velocity`` (rad/s), ``position``
     (rad), ``torque`` (N m) and ``moment`` (N m) map names to arrays, such as
     ``record.velocity['left']``.
     """
 
-    def __init__(self, simulation, snapshots):
+    def __init__(self, mechanism, rows, title):
         """
         Make the arrays.
 
-        :param simulation: gives the names, a ``Simulation`` of the same variant.
-        :param snapshots: sequence of ``Snapshot``.
+        :param mechanism: gives the names, a ``Mechanism`` or a ``Simulation``.
+        :param rows: as ``as_row`` makes them, or all of them one after the other.
+        :param title: what stands above the picture.
         """
-        self.variant = simulation.variant
-        names = column_names(simulation)
-        table = np.array([as_row(snapshot) for snapshot in snapshots]).reshape(-1, len(names))
-        self.columns = dict(zip(names, table.T))
+        self.title = title
+        names = column_names(mechanism)
+        self._table = np.asarray(rows, float).reshape(-1, len(names))
+        self.columns = dict(zip(names, self._table.T))
         self.time = self.columns['time']
         self.power_flow = self.columns['power_flow'].astype(int)
         self.velocity, self.position, self.torque, self.moment = (
             {name.removeprefix(kind): values for name, values in self.columns.items()
              if name.startswith(kind)}
             for kind in ('velocity.', 'position.', 'torque.', 'moment.'))
+
+    @classmethod
+    def of(cls, simulation, snapshots):
+        """Return the record of the ``Snapshot`` s of a ``Simulation``."""
+        return cls(simulation, [as_row(snapshot) for snapshot in snapshots], simulation.variant)
 
     def __len__(self):
         return len(self.time)
@@ -47,9 +54,14 @@ class Record:
 
     def save_csv(self, path):
         """Write the record with the columns of OUT.csv of ``simulate``."""
-        write_csv(self.columns, path)
+        with replacing(path, 'w') as file:
+            write_csv(file, self.columns, map(tuple, self._table.tolist()))
 
     def save_plot(self, path):
         """Draw the record as PNG, which needs matplotlib."""
         with replacing(path, 'wb') as file:
-            save_plot(self.columns, file, self.variant)
+            self.draw(file)
+
+    def draw(self, file):
+        """Draw the record as PNG into a binary file."""
+        save_plot(self.columns, file, self.title)

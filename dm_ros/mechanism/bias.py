@@ -19,8 +19,8 @@ by friction, with the shafts locked.
 import math
 from typing import NamedTuple
 
+from dm_ros.mechanism.clutched import full_friction
 from dm_ros.mechanism.power_flow import DIRECT
-from dm_ros.mechanism.self_locking import full_friction
 
 
 class Split(NamedTuple):

@@ -37,11 +37,3 @@ def self_locking(time):
     load = 15.0 * sin(1.1 * time + 1.5) - carrier
     front_share = 0.42 + 0.28 * sin(2.3 * time + 1.0)
     return carrier, front_share * load, (1.0 - front_share) * load
-
-
-PROFILES = {'symmetric': symmetric, 'lsd': self_locking}
-
-
-def profile(variant):
-    """Return the load for a variant, such as that of ``lsd`` for ``lsd_ode``."""
-    return PROFILES[variant.split('_')[0]]

@@ -176,6 +176,11 @@ class SymmetricParameters(Parameters):
     eta_1G: float = efficiency('left_mesh', 0.99)
     eta_2G: float = efficiency('right_mesh', 0.99)
 
+    @property
+    def rated_efficiency(self):
+        """Efficiency (37), with its erratum: eta_2G beside eta_1G, not eta_1G twice."""
+        return self.eta_3B * self.eta_FG * self.eta_0B * (self.eta_1G + self.eta_2G) / 2
+
     def _check_mechanism(self):
         if self.g_F == 0.0:
             raise ValueError('symmetric.final_drive_ratio: 0.0 is not allowed, it must not be 0')
@@ -257,6 +262,11 @@ class SelfLockingParameters(Parameters):
         """Friction factors f_k of (55) at full slip, as a pair."""
         return (self.n_F1 * self.mu_1 * self.R_F1 / self.R_1,
                 self.n_F2 * self.mu_2 * self.R_F2 / self.R_2)
+
+    @property
+    def rated_efficiency(self):
+        """Efficiency as (37), without final drive; the gears weigh by their torque, 1 : g_12."""
+        return self.eta_0B * (self.eta_1G + self.g_12 * self.eta_2G) / (1 + self.g_12)
 
     def _check_mechanism(self):
         """

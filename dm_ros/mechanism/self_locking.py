@@ -13,9 +13,9 @@ Three formulations of one mechanism, each for direct and reverse power flow:
                        (78)-(88)
 
 Symbols and signs are those of the paper, the order of the elements is (0, 1, 2, s): carrier,
-front, rear, satellite. ``T`` is (T_0, T_1, T_2); a torque is positive when it accelerates its
-shaft. Where a printed equation contradicts the others, the corrected form stands here, marked
-"erratum", and a test shows that the printed one fails.
+front, rear, satellite. ``T`` holds the torques on the ports, in their order; a torque is positive
+when it accelerates its shaft. Where a printed equation contradicts the others, the corrected form
+stands here, marked "erratum", and a test shows that the printed one fails.
 
 The clutch friction depends on the speeds through the slip omega_1 - omega_2 alone, so the
 motion is written in the carrier speed and the slip, y = (omega_0, omega_1 - omega_2). Under
@@ -25,28 +25,33 @@ held torques each formulation is linear but for the clutch moments F = (F_1, F_2
     M     = P y + Q T - W F        M = (M_1, M_2), in the sign of the paper
     F_k   = f_k (tan(alpha) |M_k| + n_s N_k R_k),    f_k ~ tanh(c_fk (omega_k - omega_0))
 
-``LinearResponse`` holds these matrices; ``solve_moments`` takes the last two lines exactly.
+``LinearResponse`` holds these matrices; ``clutched`` takes all three lines at once.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
+from dm_ros.mechanism.ports import acting_on, torque
 from dm_ros.mechanism.power_flow import DIRECT
 
 SHAFTS = ('carrier', 'front', 'rear', 'satellite')
-MOMENTS = ('front_mesh', 'rear_mesh', 'front_clutch', 'rear_clutch')
+PORTS = torque('carrier'), torque('front'), torque('rear')
+OUTPUTS = ('front', 'rear')
+GEARS = ('front_mesh', 'rear_mesh')
+BEARINGS = ('carrier_bearing',)
+CLUTCHES = ('front_clutch', 'rear_clutch')
+ON_SHAFTS = acting_on(SHAFTS, PORTS)
 
 
 class LinearResponse(NamedTuple):
     """Accelerations and gear moments, linear in speeds, torques and clutch moments."""
 
     A: np.ndarray   # (2, 2)
-    B: np.ndarray   # (2, 3)
+    B: np.ndarray   # (2, ports)
     C: np.ndarray   # (2, 2)
     P: np.ndarray   # (2, 2)
-    Q: np.ndarray   # (2, 3)
+    Q: np.ndarray   # (2, ports)
     W: np.ndarray   # (2, 2)
 
 
@@ -68,46 +73,6 @@ def slip_coordinates(p):
 def viscosities(p):
     """Return diag(l_0, l_1, l_2, l_s), (65), (86)."""
     return np.diag([p.l_0, p.l_1, p.l_2, p.l_s])
-
-
-def slip_steepness(p):
-    """Return (a_1, a_2), s/rad: f_k grows with tanh(a_k (omega_1 - omega_2)), (58)."""
-    return p.c_f1 * p.g_12 / (1 + p.g_12), -p.c_f2 / (1 + p.g_12)
-
-
-def full_friction(p):
-    """Return tan(alpha) f_k and the preload friction f_k n_s N_k R_k at full slip, (56)."""
-    (f_1, f_2), tan = p.f, math.tan(p.alpha)
-    return (f_1 * tan, f_2 * tan), (f_1 * p.n_s * p.N_1 * p.R_1, f_2 * p.n_s * p.N_2 * p.R_2)
-
-
-def solve_moments(z, W, x):
-    """
-    Solve M = z - W diag(x) |M| for the gear moments.
-
-    For each of the four sign patterns of M the system is linear; for admissible parameters
-    exactly one pattern agrees with its own solution, and it is found by looking, not by
-    iteration.
-
-    :param z: gear moments without the proportional friction, (2,), N m.
-    :param W: influence of the clutch moments on the gear moments, (2, 2).
-    :param x: signed proportional friction factors tan(alpha) f_k, (2,).
-    :return: ``(M_1, M_2)``, N m.
-    """
-    (W_11, W_12), (W_21, W_22) = W
-    best = None
-    for sign_1 in (1.0, -1.0):
-        for sign_2 in (1.0, -1.0):
-            # (I + W diag(x sign)) M = z
-            a, b = 1 + W_11 * x[0] * sign_1, W_12 * x[1] * sign_2
-            c, d = W_21 * x[0] * sign_1, 1 + W_22 * x[1] * sign_2
-            det = a * d - b * c
-            M_1, M_2 = (d * z[0] - b * z[1]) / det, (a * z[1] - c * z[0]) / det
-            wrong = max(0.0, -M_1 * sign_1, -M_2 * sign_2)
-            if best is None or wrong < best[0]:
-                best = wrong, M_1, M_2
-    # where M_k is zero up to rounding two patterns meet, and the less wrong one stands
-    return best[1:]
 
 
 def balance(p, direction):
@@ -171,8 +136,9 @@ class SelfLockingLagged:
         p = self.p
         I_D, eta_t, eta_l, eta_f = balance(p, direction)
         L = viscous(p)
-        A, B, C = (np.linalg.solve(I_D, m) for m in (-eta_l @ L, eta_t, eta_f))     # (67)
-        I_G, T_G, E = np.diag([p.I_1, p.I_2]), np.eye(2, 3, k=1), np.eye(2)
+        A, B, C = (np.linalg.solve(I_D, m)
+                   for m in (-eta_l @ L, eta_t @ ON_SHAFTS[:3], eta_f))                  # (67)
+        I_G, T_G, E = np.diag([p.I_1, p.I_2]), ON_SHAFTS[1:3], np.eye(2)
         P, Q, W = I_G @ A + L[1:3], I_G @ B - T_G, I_G @ C - E
         eta_G = np.diag([p.eta_1G, p.eta_2G]) if direction == DIRECT else -E
         P, Q, W = (np.linalg.solve(eta_G, m) for m in (P, Q, W))                  # (68), (70)
@@ -209,7 +175,8 @@ class SelfLockingOde:
         G_D, eta_t, eta_l, eta_f = self.system(direction)
         S = slip_coordinates(self.p)
         A, B, C = (np.linalg.solve(G_D, m)
-                   for m in (-eta_l @ viscous(self.p) @ np.linalg.inv(S), eta_t, eta_f))
+                   for m in (-eta_l @ viscous(self.p) @ np.linalg.inv(S),
+                             eta_t @ ON_SHAFTS[:3], eta_f))
         return LinearResponse(S @ A[:2], S @ B[:2], S @ C[:2], A[2:], B[2:], C[2:])
 
 
@@ -285,6 +252,7 @@ class SelfLockingDae:
     def response(self, direction):
         """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
         G_D, g_T, g_L, g_F = self.system(direction)
-        A, B, C = (np.linalg.solve(G_D, m) for m in (-g_L @ self.lift(), g_T, g_F))
+        A, B, C = (np.linalg.solve(G_D, m)
+                   for m in (-g_L @ self.lift(), g_T @ ON_SHAFTS[:3], g_F))
         to_y = np.array([[1, 0, 0, 0], [0, 1, -1, 0]])   # (e_0, e_1 - e_2)
         return LinearResponse(to_y @ A[:4], to_y @ B[:4], to_y @ C[:4], A[4:], B[4:], C[4:])

@@ -10,9 +10,9 @@ Two formulations of one mechanism, each for direct and reverse power flow:
 ``SymmetricDae``  variant 2: all elements and their constraints, 8x8, (40)-(52)
 
 Symbols and signs are those of the paper, the order of the elements is (0, 1, 2, 3, s):
-carrier, left, right, pinion, satellite. ``T`` is (T_1, T_2, T_3); a torque is positive when
-it accelerates its shaft. Where a printed equation contradicts the others, the corrected form
-stands here, marked "erratum", and a test shows that the printed one fails.
+carrier, left, right, pinion, satellite. ``T`` holds the torques on the ports, in their order; a
+torque is positive when it accelerates its shaft. Where a printed equation contradicts the others,
+the corrected form stands here, marked "erratum", and a test shows that the printed one fails.
 
 Under held torques both are linear. Each gives, for one direction (+1 direct, -1 reverse),
 
@@ -20,23 +20,29 @@ Under held torques both are linear. Each gives, for one direction (+1 direct, -1
     M   = P omega_D + Q T        M = (M_F, M_1, M_2), in the sign of the paper
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from dm_ros.mechanism.ports import acting_on, torque
 from dm_ros.mechanism.power_flow import DIRECT
 
 SHAFTS = ('carrier', 'left', 'right', 'pinion', 'satellite')
-MOMENTS = ('final_drive', 'left_mesh', 'right_mesh')
+PORTS = torque('pinion'), torque('left'), torque('right')
+OUTPUTS = ('left', 'right')
+GEARS = ('final_drive', 'left_mesh', 'right_mesh')
+BEARINGS = ('pinion_bearing', 'carrier_bearing')
+ON_SHAFTS = acting_on(SHAFTS, PORTS)
 
 
 class LinearResponse(NamedTuple):
     """Accelerations and internal moments, linear in speeds and torques."""
 
     A: np.ndarray   # (2, 2)
-    B: np.ndarray   # (2, 3)
+    B: np.ndarray   # (2, ports)
     P: np.ndarray   # (3, 2)
-    Q: np.ndarray   # (3, 3)
+    Q: np.ndarray   # (3, ports)
 
 
 def kinematics(p):
@@ -119,7 +125,7 @@ class SymmetricOde:
         p = self.p
         eta_sigma, eta_s, eta_t, eta_l = self.efficiencies(direction)
         I_D = np.array([self.inertia() @ eta_sigma, self.inertia() @ eta_s])          # (25), (27)
-        g_T = np.diag([1, 1, p.g_F])                                                   # (28)
+        g_T = np.diag([1, 1, p.g_F]) @ ON_SHAFTS[1:4]            # (28) of T_D = (T_1, T_2, T_3)
         g_L = np.diag([1, 1, 1, p.g_F, p.n_s / p.g_2s])                                # (30)
         L = self.viscous()
         A = -np.linalg.solve(I_D, eta_l @ g_L @ L)                                     # (34)
@@ -131,15 +137,15 @@ class SymmetricOde:
             eta_M = np.diag([1, 1 / p.eta_1G, 1 / p.eta_2G])
             inertia = np.diag([-p.I_3 * p.g_F**2 * p.eta_3B, p.I_1, p.I_2])
             drag = np.array([-p.g_F * L[3], L[1], L[2]])
-            torque = np.array([[0, 0, p.g_F * p.eta_3B], [-1, 0, 0], [0, -1, 0]])
+            load = np.array([[0, 0, p.g_F * p.eta_3B], [-1, 0, 0], [0, -1, 0]])
         else:
             eta_M = np.diag([1 / p.eta_FG, 1, 1])
             inertia = np.diag([p.I_3 * p.g_F**2, -p.I_1, -p.I_2])
             drag = np.array([p.g_F / p.eta_3B * L[3], -L[1], -L[2]])
-            torque = np.array([[0, 0, -p.g_F / p.eta_3B], [1, 0, 0], [0, 1, 0]])
+            load = np.array([[0, 0, -p.g_F / p.eta_3B], [1, 0, 0], [0, 1, 0]])
         return LinearResponse(A, B,
                               eta_M @ (inertia @ e @ A + drag),
-                              eta_M @ (inertia @ e @ B + torque))
+                              eta_M @ (inertia @ e @ B + load @ ON_SHAFTS[1:4]))
 
 
 class SymmetricDae:
@@ -221,5 +227,35 @@ class SymmetricDae:
     def response(self, direction):
         """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
         A, B = self.system(direction)
-        A, B = A[:, :5] @ self.lift(), B[:, 1:4]   # T_D = (0, T_1, T_2, T_3, 0, 0, 0, 0), (48)
+        A, B = A[:, :5] @ self.lift(), B[:, :5] @ ON_SHAFTS   # T_D of (48), 0 where no port is
         return LinearResponse(A[self.INDEPENDENT], B[self.INDEPENDENT], A[5:], B[5:])
+
+
+@dataclass(frozen=True, slots=True)
+class Moments:
+    """The internal moments in plain floats, for one direction; the torques are (T_3, T_1, T_2)."""
+
+    P_F1: float
+    P_F2: float
+    Q_F3: float
+    Q_F1: float
+    Q_F2: float
+    P_11: float
+    P_12: float
+    Q_13: float
+    Q_11: float
+    Q_12: float
+    P_21: float
+    P_22: float
+    Q_23: float
+    Q_21: float
+    Q_22: float
+
+
+def moments(k, x, T):
+    """Return (M_F, M_1, M_2) at the speeds x under the torques T, by ``Moments``."""
+    x_1, x_2 = x
+    T_3, T_1, T_2 = T
+    return (k.P_F1 * x_1 + k.P_F2 * x_2 + k.Q_F3 * T_3 + k.Q_F1 * T_1 + k.Q_F2 * T_2,
+            k.P_11 * x_1 + k.P_12 * x_2 + k.Q_13 * T_3 + k.Q_11 * T_1 + k.Q_12 * T_2,
+            k.P_21 * x_1 + k.P_22 * x_2 + k.Q_23 * T_3 + k.Q_21 * T_1 + k.Q_22 * T_2)

@@ -16,37 +16,106 @@ work       the held torques times the angles that the simulation reports
 stored     the difference of the kinetic energies at the ends
 losses     of the symmetric differential in closed form: its motion is an exponential, and its
            powers are quadratic in speeds and torques, so their integrals are quadratic too;
-           of the self-locking one by quadrature along the path of ``ClutchStep``
-numerical  zero for the symmetric one. The path of ``ClutchStep`` obeys the equations but for
+           of the self-locking one by quadrature along the path of its step
+numerical  zero for the symmetric one. The path of the clutch's step obeys the equations but for
            its error; this is the work of that error, positive when it takes energy away
 """
 
 from operator import add
 from typing import NamedTuple
 
-from dm_ros.motion.meters import AT_REST, METERS
-from dm_ros.motion.models import MODELS
-from dm_ros.motion.simulation import Simulation, Snapshot
+from dm_ros.motion.meters import meter_of
+from dm_ros.motion.simulation import Simulation
 
+AT_REST = 1e-6    # of the stored energy: with less turned over, its rounding is all there is
 NO_LOSS = 1e-12   # of the energy turned over in a tick: less than that, given back, is rounding
+
+
+class Layout(NamedTuple):
+    """Where the entries of a mechanism's books stand, as the meters make them."""
+
+    work: slice
+    stored: int
+    viscous: int
+    gears: slice
+    bearings: slice
+    clutches: slice
+    numerical: int
+    scale: int
+
+    @classmethod
+    def of(cls, mechanism):
+        """Return the layout for a ``Mechanism``."""
+        stored = len(mechanism.ports)
+        gears = stored + 2
+        bearings = gears + len(mechanism.gears)
+        clutches = bearings + len(mechanism.bearings)
+        numerical = clutches + len(mechanism.clutches)
+        return cls(slice(0, stored), stored, stored + 1, slice(gears, bearings),
+                   slice(bearings, clutches), slice(clutches, numerical), numerical,
+                   numerical + 1)
+
+    @property
+    def losses(self):
+        """Where all losses of the mechanism stand."""
+        return slice(self.viscous, self.numerical)
+
+    @property
+    def gears_and_bearings(self):
+        """Where those losses stand that may give energy back."""
+        return slice(self.gears.start, self.bearings.stop)
 
 
 class Energy(NamedTuple):
     """Energies in J, or powers in W; each positive when the mechanism takes or loses it."""
 
-    work: tuple         # of the torque on each input shaft, in the order of the inputs
-    stored: float       # change of the kinetic energy
-    viscous: float      # loss in all viscous drags
-    gears: tuple        # loss in each gear mesh, in the order of ``gear_names``
-    bearings: tuple     # loss in each bearing, in the order of ``bearing_names``
-    clutches: tuple     # loss in each clutch, in the order of ``clutch_names``
-    numerical: float    # taken by the error of the step
-    scale: float        # sum of the magnitudes of all these; see ``relative_residual``
+    entries: tuple
+    layout: Layout
+
+    @property
+    def work(self):
+        """Of the torque on each input shaft, in the order of the inputs."""
+        return self.entries[self.layout.work]
+
+    @property
+    def stored(self):
+        """The change of the kinetic energy."""
+        return self.entries[self.layout.stored]
+
+    @property
+    def viscous(self):
+        """The loss in all viscous drags."""
+        return self.entries[self.layout.viscous]
+
+    @property
+    def gears(self):
+        """The loss in each gear mesh, in the order of ``gear_names``."""
+        return self.entries[self.layout.gears]
+
+    @property
+    def bearings(self):
+        """The loss in each bearing, in the order of ``bearing_names``."""
+        return self.entries[self.layout.bearings]
+
+    @property
+    def clutches(self):
+        """The loss in each clutch, in the order of ``clutch_names``."""
+        return self.entries[self.layout.clutches]
+
+    @property
+    def numerical(self):
+        """What the error of the step took."""
+        return self.entries[self.layout.numerical]
+
+    @property
+    def scale(self):
+        """The sum of the magnitudes of all these; see ``relative_residual``."""
+        return self.entries[self.layout.scale]
 
     @property
     def lost(self):
         """The sum of all losses of the mechanism, without ``numerical``."""
-        return self.viscous + sum(self.gears) + sum(self.bearings) + sum(self.clutches)
+        return sum(self.entries[self.layout.losses])
 
     @property
     def residual(self):
@@ -61,7 +130,8 @@ class Energy(NamedTuple):
     @property
     def efficiency(self):
         """Power given over power taken, input shaft against outputs, or None if none is given."""
-        powers = self.work[0], self.work[1] + self.work[2]
+        driving, *others = self.work
+        powers = driving, sum(others)
         taken, given = max(powers), -min(powers)
         return given / taken if taken > 0.0 and given >= 0.0 else None
 
@@ -73,61 +143,31 @@ class Returned(NamedTuple):
     energy: float
 
 
-def rated_efficiency(p):
-    """
-    Return the efficiency (37), with its erratum: eta_2G beside eta_1G, not eta_1G twice.
+class AuditedSnapshot(NamedTuple):
+    """A ``Snapshot`` with the books of its tick."""
 
-    That of the self-locking differential is made alike: without a final drive, and with the
-    gears weighted by the torque that they carry, 1 : g_12.
-    """
-    if p.prefix == 'lsd':
-        return p.eta_0B * (p.eta_1G + p.g_12 * p.eta_2G) / (1 + p.g_12)
-    return p.eta_3B * p.eta_FG * p.eta_0B * (p.eta_1G + p.eta_2G) / 2
-
-
-class MeteredModel:
-    """A model whose ``step`` writes to a book, which is that of one tick."""
-
-    def __init__(self, model, meter):
-        self._model, self._meter = model, meter
-        for name in ('parameters', 'inputs', 'outputs', 'shafts', 'moments', 'independent',
-                     'all_shafts', 'powers', 'internal_moments'):
-            setattr(self, name, getattr(model, name))
-        self._driving = self.shafts.index(self.inputs[0])
-        self.layout = tuple(map(len, (meter.gears, meter.bearings, meter.clutches)))
-        self.clear()
-
-    def clear(self):
-        """Begin a tick."""
-        self.book = [0.0] * (6 + sum(self.layout))
-
-    def stored_energy(self, x):
-        """Return the kinetic energy, J."""
-        return sum(I_k * w * w for I_k, w in zip(self._meter.inertias, self.all_shafts(x))) / 2
-
-    def step(self, x, memory, torque, direction):
-        """Step as the model does and book it."""
-        result, losses = self._meter.step(self._model, x, memory, torque, direction)
-        all_shafts = self.all_shafts
-        angles = all_shafts(result[1])
-        stored = sum([I_k * (b - a) * (b + a) for I_k, a, b in
-                      zip(self._meter.inertias, all_shafts(x), all_shafts(result[0]))]) / 2
-        T_a, T_b, T_c = torque   # of the carrier or the pinion, and of the outputs
-        entries = (T_a * angles[self._driving], T_b * angles[1], T_c * angles[2], stored, *losses)
-        self.book = list(map(add, self.book, entries))
-        return result
+    time: float
+    velocity: tuple
+    position: tuple
+    torque: tuple
+    moment: tuple
+    power_flow: int
+    energy: Energy         # J
+    stored_energy: float   # J
 
 
-class AuditedSnapshot(Snapshot):
-    """A ``Snapshot`` with ``energy``, the books of its tick, and ``stored_energy``, both in J."""
+def rated_efficiency(parameters):
+    """Return the efficiency (37) of a mechanism, see the tables of parameters."""
+    return parameters.rated_efficiency
 
 
 class AuditedSimulation(Simulation):
     """
     A ``Simulation`` that keeps the books of its energy.
 
-    Setting parameters may change the stored energy without any work, as the inertias change and
-    the speeds go on: that is in no ``Energy`` but in ``stored_by_changes``, in J, so that
+    Setting parameters or the state may change the stored energy without any work, as the
+    inertias or the speeds change: that is in no ``Energy`` but in ``stored_by_changes``, in J, so
+    that
 
         stored_energy = that at the start + total.stored + stored_by_changes
 
@@ -137,92 +177,99 @@ class AuditedSimulation(Simulation):
     @property
     def gear_names(self):
         """Names of the gears, in the order of ``Energy.gears``."""
-        return METERS[self.parameters.prefix].gears
+        return self.mechanism.gears
 
     @property
     def bearing_names(self):
         """Names of the bearings, in the order of ``Energy.bearings``."""
-        return METERS[self.parameters.prefix].bearings
+        return self.mechanism.bearings
 
     @property
     def clutch_names(self):
         """Names of the clutches, in the order of ``Energy.clutches``."""
-        return METERS[self.parameters.prefix].clutches
+        return self.mechanism.clutches
 
     def prepare(self, parameters, substeps=None):
         model, substeps = super().prepare(parameters, substeps)
-        formulation = MODELS[self.variant][1]
-        meter = METERS[model.parameters.prefix](formulation, model.parameters, self.dt / substeps)
-        return MeteredModel(model, meter), substeps
+        return model, substeps, meter_of(self.mechanism, model)
 
     def adopt(self, prepared):
-        if self._model is None:
-            super().adopt(prepared)
-            return
-        before = self.stored_energy
+        *prepared, self._meter = prepared
+        first = self._model is None
         super().adopt(prepared)
-        self.stored_by_changes += self.stored_energy - before
+        if not first:
+            self._note_change()
+
+    @Simulation.state.setter
+    def state(self, state):
+        Simulation.state.fset(self, state)
+        self._note_change()
+
+    def _note_change(self):
+        before, self._stored = self._stored, self._meter.stored_energy(self._x)
+        self.stored_by_changes += self._stored - before
 
     def reset(self):
+        self._stored = self.stored_by_changes = 0.0
         super().reset()
-        self._model.clear()
-        self.worst = self.stored_by_changes = self._tick_scale = self._total_scale = 0.0
-        self._tick = self._total = self._model.book
-        gears, bearings, _ = self._model.layout
-        self._losses = range(5, 5 + gears + bearings)
-        self._returned_ticks = [0] * len(self._losses)
-        self._returned = [0.0] * len(self._losses)
+        self._layout = layout = Layout.of(self.mechanism)
+        self._tick = self._total = (0.0,) * (layout.scale + 1)
+        self.worst = self.stored_by_changes = 0.0   # the start is no change
+        may_return = len(self.gear_names + self.bearing_names)
+        self._returned_ticks, self._returned = [0] * may_return, [0.0] * may_return
 
     def advance(self, torques):
-        self._model.clear()
-        super().advance(torques)
-        tick = self._tick = self._model.book
-        scale = self._tick_scale = max(sum(map(abs, tick)), AT_REST * self.stored_energy)
-        self._total = list(map(add, self._total, tick))
-        self._total_scale += scale
-        residual = abs(sum(tick[:3]) - sum(tick[3:]))
+        steps = super().advance(torques)
+        meter, T, layout = self._meter, self._torque, self._layout
+        tick = meter.book(steps[0], T)
+        if len(steps) > 1:
+            for step in steps[1:]:
+                tick = tuple(map(add, tick, meter.book(step, T)))
+        self._stored = stored = meter.stored_energy(self._x)
+        scale = max(sum(map(abs, tick)), AT_REST * stored)
+        work = sum(tick[layout.work])
+        residual = abs(work + work - sum(tick))   # work less all others
         if residual > self.worst * scale:
             self.worst = residual / scale
-        for i in self._losses:
-            if tick[i] < -NO_LOSS * scale:
-                self._returned_ticks[i - 5] += 1
-                self._returned[i - 5] -= tick[i]
+        losses = tick[layout.gears_and_bearings]
+        if min(losses) < -NO_LOSS * scale:
+            self._note_returned(losses, NO_LOSS * scale)
+        self._tick = tick = (*tick, scale)
+        self._total = tuple(map(add, self._total, tick))
+        return steps
+
+    def _note_returned(self, losses, rounding):
+        for n, loss in enumerate(losses):
+            if loss < -rounding:
+                self._returned_ticks[n] += 1
+                self._returned[n] -= loss
 
     def snapshot(self):
         """Return the ``AuditedSnapshot`` of the last tick, or of the start at zero torque."""
-        snapshot = AuditedSnapshot(*super().snapshot())
-        snapshot.energy, snapshot.stored_energy = self.tick, self.stored_energy
-        return snapshot
+        return AuditedSnapshot(*self._report(), Energy(self._tick, self._layout), self._stored)
 
     @property
     def stored_energy(self):
         """The kinetic energy now, J."""
-        return self._model.stored_energy(self._x)
+        return self._stored
 
     @property
     def tick(self):
         """The ``Energy`` of the last tick, J."""
-        return self._energy(self._tick, self._tick_scale)
+        return Energy(self._tick, self._layout)
 
     @property
     def total(self):
         """The ``Energy`` of all ticks since the start, J."""
-        return self._energy(self._total, self._total_scale)
+        return Energy(self._total, self._layout)
 
     @property
     def power(self):
         """The mean power in the last tick, as an ``Energy`` in W."""
-        return self._energy([energy / self.dt for energy in self._tick],
-                            self._tick_scale / self.dt)
+        return Energy(tuple([entry / self.dt for entry in self._tick]), self._layout)
 
     @property
     def returned(self):
         """``{gear or bearing: Returned}`` since the start: losses that gave energy back."""
         return {name: Returned(ticks, energy) for name, ticks, energy in zip(
             self.gear_names + self.bearing_names, self._returned_ticks, self._returned)}
-
-    def _energy(self, book, scale):
-        gears, bearings, _ = self._model.layout
-        return Energy(tuple(book[:3]), book[3], book[4], tuple(book[5:5 + gears]),
-                      tuple(book[5 + gears:5 + gears + bearings]),
-                      tuple(book[5 + gears + bearings:-1]), book[-1], scale)

@@ -1,47 +1,46 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The torques in force: what was demanded, what of it is refused, clamped or too old."""
-
-import math
+"""The inputs in force: what was demanded, what of it is refused, clamped or too old."""
 
 
-class TorqueInputs:
+class HeldInputs:
     """
-    The last demanded torque of each input shaft and when it came, counted in ticks.
+    The last demand for each port and when it came, counted in ticks.
 
     A demand is taken whole or not at all. Ages are counted in simulated time, so a paused
-    mechanism does not lose its torques.
+    mechanism does not lose its inputs.
     """
 
-    def __init__(self, shafts, limit, timeout):
+    def __init__(self, ports, limit, timeout):
         """
         Start without any demand.
 
-        :param shafts: names of the input shafts; the torques in force follow their order.
-        :param limit: N m, larger demands are clamped to it.
+        :param ports: the ``Port`` s of a mechanism; the inputs in force follow their order.
+        :param limit: larger demands are clamped to it, in the unit of the ports.
         :param timeout: ticks, an older demand counts as zero; 0 for never.
         """
-        self.shafts = shafts
+        self.ports = ports
+        self.names = tuple(port.name for port in ports)
         self.limit = limit
         self.timeout = timeout
         self.received = self.refused = self.clamped = 0
-        self._index = {name: i for i, name in enumerate(shafts)}
+        self._index = {name: i for i, name in enumerate(self.names)}
         self.forget()
 
     def forget(self):
-        """Drop all demands: every shaft waits for its first one."""
-        self._demand = [0.0] * len(self.shafts)
-        self._arrival = [None] * len(self.shafts)
+        """Drop all demands: every port waits for its first one."""
+        self._demand = [0.0] * len(self.ports)
+        self._arrival = [None] * len(self.ports)
 
-    def demand(self, names, torques, tick):
+    def demand(self, names, values, tick):
         """
-        Take a demand for some shafts at a tick; return whether any of it was clamped.
+        Take a demand for some ports at a tick; return whether any of it was clamped.
 
         :raises ValueError: says why the demand is refused; the older one stays.
         """
         try:
-            clamped = self._take(names, torques, tick)
+            clamped = self._take(names, values, tick)
         except ValueError:
             self.refused += 1
             raise
@@ -50,36 +49,36 @@ class TorqueInputs:
         return clamped
 
     def in_force(self, tick):
-        """Return the torques that hold in a tick, in N m, as a tuple."""
+        """Return the inputs that hold in a tick, as a tuple."""
         if not self.timeout:
             return tuple(self._demand)
         oldest = tick - self.timeout
-        return tuple([0.0 if arrival is None or arrival < oldest else torque
-                      for torque, arrival in zip(self._demand, self._arrival)])
+        return tuple([0.0 if arrival is None or arrival < oldest else value
+                      for value, arrival in zip(self._demand, self._arrival)])
 
     def stale(self, tick):
-        """Return the names of the shafts whose demand is too old."""
-        return [name for name, arrival in zip(self.shafts, self._arrival)
+        """Return the names of the ports whose demand is too old."""
+        return [name for name, arrival in zip(self.names, self._arrival)
                 if self.timeout and arrival is not None and arrival < tick - self.timeout]
 
     def silent(self):
-        """Return the names of the shafts that never had a demand."""
-        return [name for name, arrival in zip(self.shafts, self._arrival) if arrival is None]
+        """Return the names of the ports that never had a demand."""
+        return [name for name, arrival in zip(self.names, self._arrival) if arrival is None]
 
-    def _take(self, names, torques, tick):
-        if len(names) != len(torques):
-            raise ValueError(f'{len(names)} names but {len(torques)} torques')
+    def _take(self, names, values, tick):
+        if len(names) != len(values):
+            raise ValueError(f'{len(names)} names but {len(values)} values')
         if len(set(names)) != len(names):
             raise ValueError(f'a shaft is named twice in {", ".join(names)}')
-        for name, torque in zip(names, torques):
+        for name, value in zip(names, values):
             if name not in self._index:
-                raise ValueError(f'{name!r} is not one of {", ".join(self.shafts)}')
-            if not math.isfinite(torque):
-                raise ValueError(f'the torque on {name} is {torque}')
+                raise ValueError(f'{name!r} is not one of {", ".join(self.names)}')
+            if refusal := self.ports[self._index[name]].refusal(value):
+                raise ValueError(refusal)
         clamped = False
-        for name, torque in zip(names, torques):
+        for name, value in zip(names, values):
             i = self._index[name]
-            self._demand[i] = min(max(torque, -self.limit), self.limit)
+            self._demand[i] = min(max(value, -self.limit), self.limit)
             self._arrival[i] = tick
-            clamped = clamped or abs(torque) > self.limit
+            clamped = clamped or abs(value) > self.limit
         return clamped

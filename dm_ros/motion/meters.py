@@ -2,20 +2,47 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The losses of a solver step, one meter for each mechanism; ``energy`` makes books of them.
+What a solver step did with energy, read from its path: one meter for each mechanism.
 
-A meter has the names of its ``gears``, ``bearings`` and ``clutches``, the ``inertias`` of the
-shafts, and a ``step`` that does what that of the model does and returns the losses with it.
+``book(step, T)`` takes what a model's ``step`` returned and the torques, and returns the energies
+of the step as one tuple, J: the work on each port, what was stored, what each element lost in the
+order of ``losses``, and what the error of the step took. ``stored_energy(x)`` is the kinetic one.
+
+All losses are linear in products of two of speed, moment and torque, and the moments in turn are
+linear in speeds and torques but for the friction of clutches. So what a meter must know of a path
+is its integral, its second moment, the integral of x x', and what friction does on it.
 """
+
+from operator import add
 
 import numpy as np
 
-from dm_ros.mechanism import self_locking, symmetric
-from dm_ros.mechanism.power_flow import DIRECT
-from dm_ros.motion.models import responses_of
-from dm_ros.motion.steppers import apply_phi_2, held_torque_propagator
+from dm_ros.mechanism import losses, self_locking, symmetric
+from dm_ros.mechanism.clutched import evaluate
+from dm_ros.mechanism.variants import SELF_LOCKING, SYMMETRIC
+from dm_ros.motion.exponentials import held_propagator, way
 
-AT_REST = 1e-6   # of the stored energy: with less turned over, its rounding is all there is
+
+def kinetic_form(inertias, shafts):
+    """Return (m_11, m_12, m_22): kinetic energy is (m_11 x_1^2 + m_22 x_2^2)/2 + m_12 x_1 x_2."""
+    m = shafts.T @ (np.array(inertias)[:, None] * shafts)
+    return float(m[0, 0]), float(m[0, 1]), float(m[1, 1])
+
+
+def kinetic_energy(m, x):
+    """Return the kinetic energy at the speeds x, J."""
+    m_11, m_12, m_22 = m
+    x_1, x_2 = x
+    return (m_11 * x_1 * x_1 + m_22 * x_2 * x_2) / 2 + m_12 * x_1 * x_2
+
+
+def energy_gained(m, start, end):
+    """Return the difference of the kinetic energies, J, exact also where it is small."""
+    m_11, m_12, m_22 = m
+    (x_1, x_2), (y_1, y_2) = start, end
+    s_1, s_2 = y_1 + x_1, y_2 + x_2
+    return ((y_1 - x_1) * (m_11 * s_1 + m_12 * s_2)
+            + (y_2 - x_2) * (m_12 * s_1 + m_22 * s_2)) / 2
 
 
 def pairs_of(n):
@@ -31,170 +58,226 @@ def pairs_of(n):
     return spread.astype(float), pick.astype(float)
 
 
-SPREAD, PICK = pairs_of(5)
+def second_moment_of_the_way(A, h):
+    """
+    Return the matrix (3, 3) that gives the integral of q q' from d d', both as (11, 12, 22).
+
+    q is the way from the start of a step of x' = A x + b, and d the whole of it: q' = A q + g with
+    a constant g. So z = (q, g) and z z' obey linear equations.
+    """
+    spread, pick = pairs_of(4)
+    K = np.zeros((4, 4))
+    K[:2, :2], K[:2, 2:] = A, np.eye(2)
+    both = pick @ (np.kron(K, np.eye(4)) + np.kron(np.eye(4), K)) @ spread
+    _, _, integral, _ = held_propagator(both, np.zeros((10, 0)), h)
+    _, reach, _, _ = held_propagator(A, np.eye(2), h)
+    (a, b), (c, d) = np.linalg.inv(reach)   # g from d
+    from_d = np.array([[a * a, 2 * a * b, b * b], [a * c, a * d + b * c, b * d],
+                       [c * c, 2 * c * d, d * d]])
+    return integral[np.ix_([0, 1, 4], [7, 8, 9])] @ from_d
 
 
 class SymmetricMeter:
-    """The books of a symmetric differential, exact: z = (omega_1, omega_2, T_3, T_1, T_2)."""
+    """The books of a symmetric differential, exact: its path is that of a linear equation."""
 
-    gears, bearings, clutches = symmetric.MOMENTS, ('pinion_bearing', 'carrier_bearing'), ()
+    def __init__(self, model):
+        p, self._h = model.parameters, model.h
+        self._m = kinetic_form((p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s),
+                               symmetric.kinematics(p))
+        self._g_F, self._moments = p.g_F, model.moments
+        self._losses = {d: losses.symmetric_losses(p, d) for d in model.responses}
+        self._second = {d: tuple(second_moment_of_the_way(r.A, model.h).ravel().tolist())
+                        for d, r in model.responses.items()}
 
-    def __init__(self, formulation, p, h):
-        self.inertias = p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s
-        # of each direction the (6, 5, 5) quadratic forms of the losses over h
-        self._forms = {direction: self._integrals(p, response, direction, h) for
-                       direction, response in responses_of(formulation(p)).items()}
+    def stored_energy(self, x):
+        """Return the kinetic energy at the speeds x, J."""
+        return kinetic_energy(self._m, x)
 
-    def _integrals(self, p, response, direction, h):
-        # z' = K z, so z z' grows with K on both sides: its integral is a matrix exponential too
-        K = np.zeros((5, 5))
-        K[:2] = np.hstack([response.A, response.B[:, [2, 0, 1]]])
-        both = PICK @ (np.kron(K, np.eye(5)) + np.kron(np.eye(5), K)) @ SPREAD
-        _, _, integral, _ = held_torque_propagator(both, np.zeros((15, 0)), h)
-        powers = np.array(self._powers(p, response, direction)).reshape(-1, 25)
-        forms = (powers @ SPREAD @ integral @ PICK).reshape(-1, 5, 5)
-        return (forms + forms.transpose(0, 2, 1)) / 2
-
-    def _powers(self, p, response, direction):
-        """Return the lost powers as matrices, z' matrix z, W."""
-        w_0, w_1, w_2, w_3, w_s = np.hstack([symmetric.kinematics(p), np.zeros((5, 3))])
-        L_0, L_1, L_2, L_3, _ = np.hstack([symmetric.SymmetricOde(p).viscous(),
-                                           np.zeros((5, 3))])
-        M_F, M_1, M_2 = np.hstack([response.P, response.Q[:, [2, 0, 1]]])
-        T_3 = np.eye(5)[2]
-        viscous = sum(l_k * np.outer(w, w) for l_k, w in (
-            (p.l_0, w_0), (p.l_1, w_1 - w_0), (p.l_2, w_2 - w_0), (p.l_3, w_3),
-            (p.n_s * p.l_s, w_s)))
-        if direction == DIRECT:   # what (40) takes from the moments
-            on_pinion, on_carrier = M_F / p.g_F + L_3, M_1 + M_2 + L_0 - L_1 - L_2
-        else:                     # (38)-(39), (52)
-            on_pinion, on_carrier = L_3 - T_3, M_F + L_0 - L_1 - L_2
-        return (viscous, (1 - p.eta_FG) * np.outer(M_F, w_0), (1 - p.eta_1G) * np.outer(M_1, w_1),
-                (1 - p.eta_2G) * np.outer(M_2, w_2), (1 / p.eta_3B - 1) * np.outer(on_pinion, w_3),
-                (1 / p.eta_0B - 1) * np.outer(on_carrier, w_0))
-
-    def step(self, model, x, memory, torque, direction):
-        """Return what ``model.step`` does and [viscous, gears, bearings, clutches, numerical]."""
-        z = np.array((*x, *torque))
-        losses = (self._forms[direction] @ z @ z).tolist()
-        losses.append(0.0)
-        return model.step(x, memory, torque, direction), losses
+    def book(self, step, T):
+        """Return the energies of a step, see the module."""
+        x, direction, end, (a_1, a_2), _, _, _ = step
+        (x_1, x_2), (y_1, y_2), (T_3, T_1, T_2), h = x, end, T, self._h
+        k_11, k_12, k_13, k_21, k_22, k_23, k_31, k_32, k_33 = self._second[direction]
+        # the integral of x x'
+        d_1, d_2 = y_1 - x_1, y_2 - x_2
+        d_11, d_12, d_22 = d_1 * d_1, d_1 * d_2, d_2 * d_2
+        b_1, b_2 = a_1 - h * x_1, a_2 - h * x_2
+        X_11 = x_1 * (a_1 + b_1) + k_11 * d_11 + k_12 * d_12 + k_13 * d_22
+        X_12 = x_1 * a_2 + x_2 * b_1 + k_21 * d_11 + k_22 * d_12 + k_23 * d_22
+        X_22 = x_2 * (a_2 + b_2) + k_31 * d_11 + k_32 * d_12 + k_33 * d_22
+        X_01, X_02, a_0 = (X_11 + X_12) / 2, (X_12 + X_22) / 2, (a_1 + a_2) / 2
+        # of moments and speeds: M = P x + Q T, in one sign for both directions
+        k = self._moments[direction]
+        M_F = k.Q_F3 * T_3 + k.Q_F1 * T_1 + k.Q_F2 * T_2
+        M_1 = k.Q_13 * T_3 + k.Q_11 * T_1 + k.Q_12 * T_2
+        M_2 = k.Q_23 * T_3 + k.Q_21 * T_1 + k.Q_22 * T_2
+        T_3_w3 = T_3 * self._g_F * a_0
+        lost = losses.symmetric(
+            self._losses[direction], (X_01 + X_02) / 2, (X_11 - X_22) / 2, X_11 + X_22 - 2 * X_12,
+            direction * (k.P_F1 * X_01 + k.P_F2 * X_02 + M_F * a_0),
+            direction * (k.P_11 * X_11 + k.P_12 * X_12 + M_1 * a_1),
+            direction * (k.P_21 * X_12 + k.P_22 * X_22 + M_2 * a_2),
+            direction * (k.P_11 * X_01 + k.P_12 * X_02 + M_1 * a_0),
+            direction * (k.P_21 * X_01 + k.P_22 * X_02 + M_2 * a_0), T_3_w3)
+        return T_3_w3, T_1 * a_1, T_2 * a_2, energy_gained(self._m, x, end), *lost, 0.0
 
 
-def gauss_kronrod_nodes():
+def lobatto(pieces):
     """
-    Return (node, weight, weight of Gauss's rule) of the Gauss-Kronrod rule (3, 7) on [0, 1].
+    Return Lobatto's rule of five points on [0, 1] in pieces, each as long as all before it.
 
-    Kronrod's rule on all seven nodes is exact to degree 11, Gauss's on three of them to 5.
+    What vanishes at 0 is integrated exactly to degree 7 in each piece.
+
+    :return: ``(r, r^2, r^3, weight)`` of each node r in (0, 1), 1/2 first, and the weight at 1.
     """
-    half = ((0.96049126870802028342, 0.10465622602646726519, 0.0),
-            (0.77459666924148337704, 0.26848808986833344073, 5 / 9),
-            (0.43424374934680255800, 0.40139741477596222291, 0.0))
-    middle = (0.0, 0.45091653865847414235, 8 / 9)
-    both = [(-x, *weights) for x, *weights in half] + [middle] + list(half[::-1])
-    return tuple(((1 + x) / 2, kronrod / 2, gauss / 2) for x, kronrod, gauss in both)
+    inner = (3 / 7)**0.5 / 2
+    rule = ((0.0, 1 / 20), (0.5 - inner, 49 / 180), (0.5, 16 / 45), (0.5 + inner, 49 / 180),
+            (1.0, 1 / 20))
+    edges = [0.0] + [2.0**(n + 1 - pieces) for n in range(pieces)]
+    weights = {0.5: 0.0}
+    for begin, end in zip(edges, edges[1:]):
+        for node, weight in rule:
+            at = begin + (end - begin) * node
+            weights[at] = weights.get(at, 0.0) + (end - begin) * weight
+    del weights[0.0]
+    last = weights.pop(1.0)
+    return tuple((r, r**2, r**3, weight) for r, weight in weights.items()), last
 
 
 class SelfLockingMeter:
     """
-    The books of a self-locking differential, along the path of ``ClutchStep``.
+    The books of a self-locking differential, along the path of ``clutch.step``.
 
-    Within a part of length h that path is y + t phi_1(t J) f + c (t/h)^3: its ends are those of
-    the part, its integral is the angle that the simulation reports, and it misses the equations
-    by y' - f(y), whose work is ``numerical``. The losses are integrated by Kronrod's rule of seven
-    points, that work by Gauss's rule on three of them. A piece of a part is divided near its
-    start, where a stiff clutch settles, until the first rule finds the known change of kinetic
-    energy and both rules agree on the numerical work.
+    In a part of that path the friction is its tangent at the start and a remainder, which is as
+    small as what the step calls its error: Simpson's rule will do for it. The rest is linear, and
+    known from the integral of the path, which is the angle that the simulation reports, and from
+    its second moment. The path misses the equations by y' - f(y), which is another view on the
+    remainder and on c; the work of it is what the error of the step takes.
     """
 
-    gears, bearings = self_locking.MOMENTS[:2], ('carrier_bearing',)
-    clutches = self_locking.MOMENTS[2:]
+    RULES = (None, *(lobatto(pieces) for pieces in range(1, 41)))
+    STIFF = 1.5   # time constants of the path that a piece may take
+    CALM = 4e-6   # rad/s of c: with less, the remainder is some hundredth of the step's tolerance
 
-    TOLERANCE = 1e-10   # of the energy turned over in a step
-    MOST_PIECES = 40
-    FIRST = 0.35        # of a piece that is divided
-    NODES = gauss_kronrod_nodes()
+    def __init__(self, model):
+        p = model.parameters
+        self._m = kinetic_form(
+            (p.I_0, p.I_1, p.I_2, p.n_s * p.I_s),
+            self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p)))
+        self._coefficients = model.coefficients
+        self._losses = {d: losses.self_locking_losses(p, d) for d in model.responses}
 
-    def __init__(self, formulation, p, h):
-        self._h = h
-        k_1, k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
-        G = self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p))
-        self.inertias = p.I_0, p.I_1, p.I_2, p.n_s * p.I_s
-        inertia = G.T @ (np.array(self.inertias)[:, None] * G)
-        slip_drag = p.l_1 * k_1**2 + p.l_2 * k_2**2 + p.n_s * p.l_s * (k_2 / p.g_2s)**2
-        self._constants = tuple(map(float, (
-            k_1, k_2, inertia[0, 0], inertia[0, 1], inertia[1, 1], p.l_0, slip_drag,
-            p.l_1 * k_1 - p.l_2 * k_2, 1 - p.eta_1G, 1 - p.eta_2G, 1 / p.eta_0B - 1)))
+    def stored_energy(self, x):
+        """Return the kinetic energy at the speeds x, J."""
+        return kinetic_energy(self._m, x)
 
-    def step(self, model, x, memory, torque, direction):
-        """Return what ``model.step`` does and [viscous, gears, bearings, clutches, numerical]."""
-        parts = []
-        result = model.step(x, memory, torque, direction, parts)
-        losses = [0.0] * 7
-        m_ww, m_ss = self._constants[2], self._constants[4]
-        (w, s), (w_end, s_end) = x, result[0]
-        fast, slip = max(abs(w), abs(w_end)), max(abs(s), abs(s_end))
-        turned_over = (
-            self._h * (abs(torque[0]) * fast + (abs(torque[1]) + abs(torque[2])) * (fast + slip))
-            + AT_REST * (m_ww * fast * fast + m_ss * slip * slip))
-        for part in parts:
-            self._add(part, torque, direction, self.TOLERANCE * turned_over / len(parts), losses)
-        return result, losses
+    def book(self, step, T):
+        """Return the energies of a step, see the module."""
+        x, direction, end, (a_w, a_s), _, _, (u, parts) = step
+        T_0, T_1, T_2 = T
+        k, q = self._coefficients[direction], self._losses[direction]
+        first, *others = parts
+        lost, numerical = self._part(k, q, u, T_0, first)
+        for part in others:
+            more, taken = self._part(k, q, u, T_0, part)
+            lost = tuple(map(add, lost, more))
+            numerical += taken
+        return (T_0 * a_w, T_1 * (a_w + q.k_1 * a_s), T_2 * (a_w - q.k_2 * a_s),
+                energy_gained(self._m, x, end), *lost, numerical)
 
-    def _add(self, part, torque, direction, allowed, losses):
-        """Add the losses in a part to the sums, each piece within the allowed error, J."""
-        k_1, k_2, m_ww, m_ws, m_ss, l_w, l_s, l_ws, lost_1, lost_2, lost_0 = self._constants
-        slope, w_0, s_0, (f_w, f_s), (J_ww, J_ws, J_sw, J_ss), h, c_w, c_s = part
-        T_0, direct = torque[0], direction == DIRECT
+    def _part(self, k, q, u, T_0, part):
+        """Return what the elements lost in a part of the path, and what its error took."""
+        (w, s), f, J, h, (d_w, d_s), (c_w, c_s), (a_w, a_s), straight, here, there = part
+        J_ww, J_ws, J_sw, J_ss, F_1w, F_1s, F_2w, F_2s = J
+        v_w, v_s, F_1, F_2, _, _, _, _, _, _ = here
+        m_ww, m_ws, m_ss = self._m
+        J_path = (0.0, 0.0, 0.0, 0.0) if straight else (J_ww, J_ws, J_sw, J_ss)
+        stiff = h * (abs(J_path[0]) + abs(J_path[3]))
+        pieces = 1
+        while stiff > self.STIFF:
+            stiff /= 2.0
+            pieces += 1
+        inner, end = self.RULES[min(pieces, len(self.RULES) - 1)]
+        ways = way(J_path, f, h, inner)
 
-        def path(t):
-            """Return y and y' at the time t."""
-            v_w, v_s = apply_phi_2(t * J_ww, t * J_ws, t * J_sw, t * J_ss, f_w, f_s)
-            d_w = t * (f_w + t * (J_ww * v_w + J_ws * v_s))
-            d_s = t * (f_s + t * (J_sw * v_w + J_ss * v_s))
-            r = t / h
-            r_2 = r * r
-            return (w_0 + d_w + c_w * r * r_2, s_0 + d_s + c_s * r * r_2,
-                    f_w + J_ww * d_w + J_ws * d_s + 3 * c_w * r_2 / h,
-                    f_s + J_sw * d_w + J_ss * d_s + 3 * c_s * r_2 / h)
+        # moments over the path of the way y(t) - y: of two of it, and of it and powers of t/h
+        w_r, s_r = d_w + c_w, d_s + c_s
+        w_2, s_2 = end * w_r, end * s_r
+        w_3, s_3, R_ww, R_ws, R_ss = w_2, s_2, w_2 * w_r, w_2 * s_r, s_2 * s_r
+        for (_, r_2, r_3, weight), (w_q, s_q) in zip(inner, ways):
+            w_q += c_w * r_3
+            s_q += c_s * r_3
+            a, b = weight * w_q, weight * s_q
+            R_ww += a * w_q
+            R_ws += a * s_q
+            R_ss += b * s_q
+            w_2 += a * r_2
+            s_2 += b * r_2
+            w_3 += a * r_3
+            s_3 += b * r_3
 
-        begin, w, s, pieces = 0.0, w_0, s_0, 1
-        w_end, s_end, *_ = path(h)
-        todo = [(h, w_end, s_end)]
-        while todo:
-            end, w_end, s_end = todo[-1]
-            length = end - begin
-            viscous = front = rear = bearing = clutch_1 = clutch_2 = 0.0
-            gained = error_7 = error_3 = 0.0
-            for node, weight, other in self.NODES:
-                w_t, s_t, rate_w, rate_s = path(begin + node * length)
-                f = slope(w_t, s_t)
-                F_1, F_2, M_1, M_2 = f[2:6]
-                # (59) or (60): what the carrier bearing carries
-                on_carrier = l_w * w_t - l_ws * s_t - F_1 - F_2 + (M_1 + M_2 if direct else -T_0)
-                viscous += weight * (l_w * w_t * w_t + l_s * s_t * s_t)
-                front += weight * M_1 * (w_t + k_1 * s_t)
-                rear += weight * M_2 * (w_t - k_2 * s_t)
-                bearing += weight * on_carrier * w_t
-                clutch_1 += weight * F_1 * s_t
-                clutch_2 -= weight * F_2 * s_t
-                p_w, p_s = m_ww * w_t + m_ws * s_t, m_ws * w_t + m_ss * s_t
-                gained += weight * (p_w * rate_w + p_s * rate_s)
-                error = p_w * (rate_w - f[0]) + p_s * (rate_s - f[1])
-                error_7 += weight * error
-                error_3 += other * error
-            known = ((w_end - w) * (m_ww * (w_end + w) + m_ws * (s_end + s))
-                     + (s_end - s) * (m_ws * (w_end + w) + m_ss * (s_end + s))) / 2
-            off = abs(length * gained - known) + length * abs(error_7 - error_3)
-            if off > allowed and pieces < self.MOST_PIECES:
-                middle = begin + self.FIRST * length
-                todo.append((middle, *path(middle)[:2]))
-                pieces += 1
-                continue
-            for i, loss in enumerate((viscous, lost_1 * front, lost_2 * rear, lost_0 * bearing,
-                                      k_1 * clutch_1, k_2 * clutch_2, -error_3)):
-                losses[i] += length * loss
-            begin, w, s = todo.pop()
+        # y' - f(y) but for the remainder, with the momentum at the start and that of the way
+        if straight:   # e + g t/h
+            f_w, f_s = f
+            e_w, e_s = f_w - v_w, f_s - v_s
+            g_w, g_s = -h * (J_ww * f_w + J_ws * f_s), -h * (J_sw * f_w + J_ss * f_s)
+            taken = ((m_ww * w + m_ws * s) * (e_w + g_w / 2)
+                     + (m_ws * w + m_ss * s) * (e_s + g_s / 2)
+                     + (m_ww * d_w + m_ws * d_s) * (e_w / 2 + g_w / 3)
+                     + (m_ws * d_w + m_ss * d_s) * (e_s / 2 + g_s / 3))
+        else:          # b (t/h)^2 - J c (t/h)^3
+            b_w, b_s = 3 * c_w / h, 3 * c_s / h
+            g_w, g_s = J_ww * c_w + J_ws * c_s, J_sw * c_w + J_ss * c_s
+            w_2, s_2 = w_2 + w / 3, s_2 + s / 3
+            w_3, s_3 = w_3 + w / 4, s_3 + s / 4
+            taken = ((m_ww * w_2 + m_ws * s_2) * b_w + (m_ws * w_2 + m_ss * s_2) * b_s
+                     - (m_ww * w_3 + m_ws * s_3) * g_w - (m_ws * w_3 + m_ss * s_3) * g_s)
+        r_w, r_s = a_w - h * w, a_s - h * s
+        V_ww, V_ws = r_w * w + h * R_ww, r_w * s + h * R_ws   # the integral of (y(t) - y) y(t)'
+        V_sw, V_ss = r_s * w + h * R_ws, r_s * s + h * R_ss
+        X_ww, X_ws, X_ss = w * a_w + V_ww, w * a_s + V_ws, s * a_s + V_ss
+
+        # what friction has beside its tangent
+        _, _, F_1r, F_2r, _, _, _, _, _, _ = there
+        F_1r -= F_1 + F_1w * w_r + F_1s * s_r
+        F_2r -= F_2 + F_2w * w_r + F_2s * s_r
+        w_r += w
+        s_r += s
+        if abs(c_w) + abs(c_s) < self.CALM and not straight:   # it grows with (t/h)^2
+            F_1r *= h / 3
+            F_2r *= h / 3
+            f_1w, f_1s, f_2w, f_2s = F_1r * w_r, F_1r * s_r, F_2r * w_r, F_2r * s_r
+        else:   # by Simpson's rule
+            (w_m, s_m), e, m = ways[0], h / 6, h * 2 / 3
+            w_m, s_m = w_m + c_w / 8, s_m + c_s / 8
+            _, _, F_1m, F_2m, _, _, _, _, _, _ = evaluate(k, u, w + w_m, s + s_m)
+            F_1m, F_1r = m * (F_1m - F_1 - F_1w * w_m - F_1s * s_m), e * F_1r
+            F_2m, F_2r = m * (F_2m - F_2 - F_2w * w_m - F_2s * s_m), e * F_2r
+            w_m += w
+            s_m += s
+            f_1w, f_1s = F_1m * w_m + F_1r * w_r, F_1m * s_m + F_1r * s_r
+            f_2w, f_2s = F_2m * w_m + F_2r * w_r, F_2m * s_m + F_2r * s_r
+        taken = h * taken + (
+            m_ww * (k.C_w1 * f_1w + k.C_w2 * f_2w) + m_ss * (k.C_s1 * f_1s + k.C_s2 * f_2s)
+            + m_ws * (k.C_w1 * f_1s + k.C_w2 * f_2s + k.C_s1 * f_1w + k.C_s2 * f_2w))
+
+        F_1_w = F_1 * a_w + F_1w * V_ww + F_1s * V_sw + f_1w
+        F_1_s = F_1 * a_s + F_1w * V_ws + F_1s * V_ss + f_1s
+        F_2_w = F_2 * a_w + F_2w * V_ww + F_2s * V_sw + f_2w
+        F_2_s = F_2 * a_s + F_2w * V_ws + F_2s * V_ss + f_2s
+        _, _, m_1, m_2, _, _ = u
+        return losses.self_locking(
+            q, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s,
+            m_1 * a_w + k.P_1w * X_ww + k.P_1s * X_ws - k.W_11 * F_1_w - k.W_12 * F_2_w,
+            m_1 * a_s + k.P_1w * X_ws + k.P_1s * X_ss - k.W_11 * F_1_s - k.W_12 * F_2_s,
+            m_2 * a_w + k.P_2w * X_ww + k.P_2s * X_ws - k.W_21 * F_1_w - k.W_22 * F_2_w,
+            m_2 * a_s + k.P_2w * X_ws + k.P_2s * X_ss - k.W_21 * F_1_s - k.W_22 * F_2_s,
+            T_0 * a_w), -taken
 
 
-METERS = {'symmetric': SymmetricMeter, 'lsd': SelfLockingMeter}
+METERS = {SYMMETRIC.name: SymmetricMeter, SELF_LOCKING.name: SelfLockingMeter}
+
+
+def meter_of(mechanism, model):
+    """Return the meter that reads what a model of a mechanism did."""
+    return METERS[mechanism.name](model)

@@ -9,21 +9,11 @@ Nothing here depends on measured time: equal inputs give equal bits.
 
 import math
 from operator import add
-from typing import NamedTuple
 
 from dm_ros.mechanism.power_flow import DIRECT, power_flow
-from dm_ros.motion.models import MODELS, VARIANTS
-
-
-class Snapshot(NamedTuple):
-    """What a differential reports at the end of a tick, in plain floats."""
-
-    time: float        # s, the number of ticks times their length
-    velocity: tuple    # rad/s, in the order of ``Simulation.shafts``
-    position: tuple    # rad, the integral of velocity
-    torque: tuple      # N m, held in the tick, in the order of ``Simulation.inputs``
-    moment: tuple      # N m, in the order of ``Simulation.moments``
-    power_flow: int    # +1 direct, -1 reverse, as it was in force
+from dm_ros.mechanism.variants import variant_named
+from dm_ros.motion.models import model_of
+from dm_ros.motion.state import Snapshot, State
 
 
 class Simulation:
@@ -45,9 +35,8 @@ class Simulation:
 
     def __init__(self, variant, dt=0.001, parameters=None, *, substeps=1,
                  power_flow_deadband=0.0, initial_velocity=(0.0, 0.0)):
-        if variant not in MODELS:
-            raise ValueError(f'variant: {variant!r} is not one of {", ".join(VARIANTS)}')
-        self.variant = variant
+        self._variant = variant_named(variant)
+        self.mechanism = self._variant.mechanism
         self.dt = checked('dt', dt, lambda v: v > 0.0, 'a positive number of seconds')
         self.power_flow_deadband = power_flow_deadband
         self.initial_velocity = initial_velocity
@@ -57,24 +46,29 @@ class Simulation:
         self.reset()
 
     @property
+    def variant(self):
+        """Name of the variant."""
+        return self._variant.name
+
+    @property
     def shafts(self):
         """Names of all shafts."""
-        return self._model.shafts
+        return self.mechanism.shafts
 
     @property
     def inputs(self):
         """Names of the shafts that take a torque."""
-        return self._model.inputs
+        return self.mechanism.inputs
 
     @property
     def outputs(self):
         """Names of the two output shafts."""
-        return self._model.outputs
+        return self.mechanism.outputs
 
     @property
     def moments(self):
         """Names of the internal moments."""
-        return self._model.moments
+        return self.mechanism.moments
 
     @property
     def time(self):
@@ -88,7 +82,7 @@ class Simulation:
 
     @property
     def coarse_steps(self):
-        """Solver steps since the start that reached the bound of work, see ``ClutchStep``."""
+        """Solver steps since the start that reached the bound of work, see ``clutch``."""
         return self._coarse_steps
 
     @property
@@ -108,12 +102,11 @@ class Simulation:
 
     @initial_velocity.setter
     def initial_velocity(self, velocities):
-        names = MODELS[self.variant][0].outputs
         try:
-            pair = dict(zip(names, velocities, strict=True))
+            pair = dict(zip(self.outputs, velocities, strict=True))
         except (TypeError, ValueError):
             raise ValueError(f'initial_velocity: {velocities!r} must be two numbers, '
-                             f'for {", ".join(names)}') from None
+                             f'for {", ".join(self.outputs)}') from None
         self._initial_velocity = tuple(
             checked(f'initial_velocity.{name}', value, lambda v: abs(v) <= 1e6,
                     'a number of rad/s in [-1e+06, 1e+06]') for name, value in pair.items())
@@ -141,6 +134,22 @@ class Simulation:
     def parameters(self, parameters):
         self.adopt(self.prepare(parameters))
 
+    @property
+    def state(self):
+        """
+        The ``State``, all that goes on from tick to tick but their number.
+
+        One that a simulation of the same variant and parameters had may be put back.
+        """
+        return State(self._x, self._turned, self._origin, self._torque, self._direction,
+                     self._memory)
+
+    @state.setter
+    def state(self, state):
+        (self._x, self._turned, self._origin, self._torque, self._direction,
+         self._memory) = state
+        self._point = None
+
     def prepare(self, parameters, substeps=None):
         """
         Return what ``adopt`` takes, without touching this simulation.
@@ -152,18 +161,17 @@ class Simulation:
         :param substeps: solver steps in a tick, None for those in force.
         :raises ValueError: names what is wrong, its value and what is allowed.
         """
-        model_type, formulation = MODELS[self.variant]
-        parameters_type = model_type.parameters_type
-        if not isinstance(parameters, parameters_type):
-            now = self._model.parameters if self._model else parameters_type()
+        kind = self.mechanism.parameters
+        if not isinstance(parameters, kind):
+            now = self._model.parameters if self._model else kind()
             try:
                 parameters = now.changed(dict(parameters))
             except TypeError:
                 raise ValueError(f'parameters: {type(parameters).__name__} is not '
-                                 f'{parameters_type.__name__} or a mapping') from None
+                                 f'{kind.__name__} or a mapping') from None
         substeps = checked('substeps', self._substeps if substeps is None else substeps,
                            lambda v: v >= 1 and v == int(v), 'a positive integer')
-        return model_type(formulation, parameters, self.dt / substeps), int(substeps)
+        return model_of(self._variant, parameters, self.dt / substeps), int(substeps)
 
     def adopt(self, prepared):
         """Take what ``prepare`` made; the speeds of the output shafts and all angles go on."""
@@ -171,19 +179,20 @@ class Simulation:
         self._model, self._substeps = prepared
         if old is not None:
             self._origin = self._positions(old)
-            self._integral = (0.0, 0.0)
-            velocity = dict(zip(old.shafts, old.all_shafts(self._x)))
-            self._x, _ = self._model.independent(*(velocity[s] for s in old.outputs))
+            self._turned = (0.0, 0.0)
+            velocity = dict(zip(self.shafts, old.all_shafts(self._x)))
+            self._x = self._model.independent(*(velocity[shaft] for shaft in self.outputs))
+            self._point = None
 
     def reset(self):
         """Go back to the start: time, angles and torques zero, initial speeds, index +1."""
         self._ticks = 0
         self._coarse_steps = 0
-        self._direction = DIRECT
-        self._torque = (0.0, 0.0, 0.0)
-        self._x, self._memory = self._model.independent(*self._initial_velocity)
-        self._integral = (0.0, 0.0)
-        self._origin = (0.0,) * len(self.shafts)
+        model = self._model
+        self.state = State(
+            x=model.independent(*self._initial_velocity), turned=(0.0, 0.0),
+            origin=(0.0,) * len(self.shafts), torque=(0.0,) * len(self.inputs),
+            power_flow=DIRECT, memory=(0.0, 0.0) if model.lagged else ())
 
     def step(self, torques):
         """Advance one tick under the torques, as ``advance``, and return its ``Snapshot``."""
@@ -192,60 +201,73 @@ class Simulation:
 
     def advance(self, torques):
         """
-        Advance one tick.
+        Advance one tick; return the solver steps that did it, as ``models`` tells them.
 
         :param torques: N m, in the order of ``inputs``, held in the tick.
-        :raises ValueError: for torques that are not three finite numbers, or that lead out of
-            the range of floating point numbers; the state stays what it was.
+        :raises ValueError: for torques that are not as many finite numbers as there are inputs,
+            or that lead out of the range of floating point numbers; the state stays what it was.
         """
-        torque = self._checked_torques(torques)
+        T = self._checked_torques(torques)
         model, deadband = self._model, self._deadband
         x, memory, direction = self._x, self._memory, self._direction
-        integral_1, integral_2 = self._integral
+        lagged, point = model.lagged, self._point
+        if lagged and point is None:
+            point = model.point(x, memory, self._torque, direction)
+        turned_1, turned_2 = self._turned
         coarse_steps = 0
+        steps = []
         try:
             for _ in range(self._substeps):
-                input_power, output_power = model.powers(x, torque)
+                input_power, output_power = model.powers(x, T)
                 direction = power_flow(input_power, output_power, deadband, direction)
-                x, (i_1, i_2), memory, coarse = model.step(x, memory, torque, direction)
-                integral_1 += i_1
-                integral_2 += i_2
+                if lagged:
+                    memory = model.remembered(point)
+                step = model.step(x, memory, T, direction)
+                _, _, x, (angle_1, angle_2), point, coarse, _ = step
+                turned_1 += angle_1
+                turned_2 += angle_2
                 coarse_steps += coarse
-            in_range = math.isfinite(x[0] + x[1] + integral_1 + integral_2)
+                steps.append(step)
+            in_range = math.isfinite(x[0] + x[1] + turned_1 + turned_2)
         except ArithmeticError:
             in_range = False
         if not in_range:
-            raise ValueError(f'torques: {torque} lead out of the range of floating point numbers')
-        self._x, self._memory, self._direction = x, memory, direction
-        self._integral = (integral_1, integral_2)
-        self._torque = torque
+            raise ValueError(f'torques: {T} lead out of the range of floating point numbers')
+        self._x, self._turned, self._torque = x, (turned_1, turned_2), T
+        self._direction, self._memory, self._point = direction, memory, point
         self._coarse_steps += coarse_steps
         self._ticks += 1
+        return steps
 
     def snapshot(self):
         """Return the ``Snapshot`` of the last tick, or of the start at zero torque."""
-        model, x = self._model, self._x
-        return Snapshot(
-            self._ticks * self.dt, model.all_shafts(x), self._positions(model), self._torque,
-            model.internal_moments(x, self._memory, self._torque, self._direction),
-            self._direction)
+        return Snapshot(*self._report())
+
+    def _report(self):
+        model, x, T, direction = self._model, self._x, self._torque, self._direction
+        if self._point is None:
+            self._point = model.point(x, self._memory, T, direction)
+        return (self._ticks * self.dt, model.all_shafts(x), self._positions(model), T,
+                model.internal_moments(x, T, direction, self._point), direction)
 
     def _positions(self, model):
-        return tuple(map(add, self._origin, model.all_shafts(self._integral)))
+        return tuple(map(add, self._origin, model.all_shafts(self._turned)))
 
     def _checked_torques(self, torques):
+        ports = self.mechanism.ports
         try:
-            T_a, T_b, T_c = torques
-            torque = (float(T_a), float(T_b), float(T_c))
+            T = tuple(map(float, torques))
+            fits = len(T) == len(ports)
         except (TypeError, ValueError, OverflowError):
-            raise ValueError(f'torques: {torques!r} must be three numbers, '
-                             f'for {", ".join(self.inputs)}') from None
-        if math.isfinite(torque[0] + torque[1] + torque[2]):   # as nearly always
-            return torque
-        for name, value in zip(self.inputs, torque):
-            if not math.isfinite(value):
-                raise ValueError(f'torques: {value!r} for {name} is not a finite number')
-        return torque
+            fits = False
+        if not fits:
+            raise ValueError(f'torques: {torques!r} must be {len(ports)} numbers, '
+                             f'for {", ".join(self.inputs)}')
+        if not math.isfinite(sum(T)):   # as nearly never
+            for port, value in zip(ports, T):
+                if refusal := port.refusal(value):
+                    raise ValueError(f'torques: {refusal}')
+        return T
 
 
 def checked(name, value, fits, allowed):

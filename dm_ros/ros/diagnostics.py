@@ -126,7 +126,7 @@ class Diagnostics:
         silent, stale = inputs.silent(), inputs.stale(self.simulation.ticks)
         return status(
             f'{self.name}: torques', active(self.refusing, self.clamping, self.stale),
-            'no torque yet' if len(silent) == len(inputs.shafts) else 'fine', {
+            'no torque yet' if len(silent) == len(inputs.ports) else 'fine', {
                 'received messages': inputs.received,
                 'refused messages': inputs.refused,
                 'last refused': self.refusing.reason or 'none',

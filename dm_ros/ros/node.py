@@ -25,9 +25,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int8
 from std_srvs.srv import SetBool, Trigger
 
+from dm_ros.mechanism.variants import variant_named
 from dm_ros.motion.energy import AuditedSimulation
-from dm_ros.motion.held_inputs import TorqueInputs
-from dm_ros.motion.models import MODELS
+from dm_ros.motion.held_inputs import HeldInputs
 from dm_ros.motion.pacing import Pacer
 from dm_ros.motion.simulation import Simulation
 from dm_ros.ros.diagnostics import Diagnostics
@@ -180,16 +180,16 @@ class DifferentialNode(Node):
                 raise ValueError(f'{name}: there is no such parameter')
         settings = NodeParameters()
         variant = given_parameters(self).get('variant', settings.variant)
-        model = MODELS[settings.changed({'variant': variant}).variant][0]
+        mechanism = variant_named(settings.changed({'variant': variant}).variant).mechanism
         not_mine = [f'initial_velocity.{shaft}' for shaft in ('left', 'right', 'front', 'rear')
-                    if shaft not in model.outputs]
+                    if shaft not in mechanism.outputs]
         settings = declare(self, settings, lambda name: name not in not_mine)
-        parameters = declare(self, model.parameters_type())
+        parameters = declare(self, mechanism.parameters())
         kind = AuditedSimulation if settings.energy_audit else Simulation
         self.simulation = kind(
             variant, dt=1.0 / settings.rate, parameters=parameters, substeps=settings.substeps,
             power_flow_deadband=settings.deadband,
-            initial_velocity=settings.initial_velocity(model.outputs))
+            initial_velocity=settings.initial_velocity(mechanism.outputs))
         self._settings = settings
         self._follows_clock = self.get_parameter('use_sim_time').value
         if self._follows_clock and settings.publish_clock:
@@ -198,7 +198,7 @@ class DifferentialNode(Node):
         # another simulator's clock may leap by many ticks, but not by more than a second
         self._pacer = Pacer(1e9 / settings.rate,
                             patience=settings.rate if self._follows_clock else 0)
-        self._inputs = TorqueInputs(self.simulation.inputs, settings.torque_limit, 0.0)
+        self._inputs = HeldInputs(self.simulation.mechanism.ports, settings.torque_limit, 0.0)
         self._last_stamp = 0
         self._prepared = settings, None
         self._apply(settings)

@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Records what a node ``differential`` publishes, as columns like those of ``simulate``."""
+"""Records what a node ``differential`` publishes."""
 
 from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
@@ -10,8 +10,8 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int8
 
-from dm_ros.files.output import column_names
-from dm_ros.motion.simulation import Simulation
+from dm_ros.files.record import Record
+from dm_ros.mechanism.variants import variant_named
 from dm_ros.ros.messages import never_called, poll, Polled
 
 DEEP_QOS = QoSProfile(depth=5000)
@@ -27,7 +27,7 @@ class Recorder:
 
     def __init__(self, node, variant):
         """:param node: full name of the node to record; variant: which it runs."""
-        self._names = Simulation(variant)
+        self._mechanism = variant_named(variant).mechanism
         self._context = rclpy.Context()
         rclpy.init(context=self._context,
                    signal_handler_options=rclpy.SignalHandlerOptions.NO)
@@ -80,22 +80,22 @@ class Recorder:
         """Ticks that the node reported as missed during the record."""
         return self._missed - self._missed_before
 
-    def columns(self, duration):
+    def record(self, duration, title):
         """
-        Return the record as ``{column: array}``, with the columns of OUT.csv of ``simulate``.
+        Return the ``Record``, whose time begins with the first tick.
 
-        :param duration: s, what came later after the first tick is left out.
+        :param duration: s, what came later is left out; title: of the record.
         :raises RuntimeError: for a record without two whole ticks.
         """
         table = np.array(list(self._rows()))
         if len(table) < 2:
             raise RuntimeError('the record is empty')
         table[:, 0] -= table[0, 0]
-        return dict(zip(column_names(self._names), table[table[:, 0] <= duration].T))
+        return Record(self._mechanism, table[table[:, 0] <= duration], title)
 
     def _rows(self):
         sent = np.array([timestamp for timestamp, _ in self._flows])
-        inputs = [self._names.shafts.index(name) for name in self._names.inputs]
+        inputs = [self._mechanism.shafts.index(name) for name in self._mechanism.inputs]
         ends = [timestamp for timestamp, _ in self._joints[1:]] + [np.inf]
         for (timestamp, joints), end in zip(self._joints, ends):
             moments = self._moments.get(stamp(joints))

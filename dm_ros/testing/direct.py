@@ -37,12 +37,12 @@ class DirectDifferential:
             self.snapshots.append(snapshot)
             if until and until(snapshot):
                 break
-        return Record(self.simulation, self.snapshots[first:])
+        return Record.of(self.simulation, self.snapshots[first:])
 
     @property
     def record(self):
         """The ``Record`` of all runs."""
-        return Record(self.simulation, self.snapshots)
+        return Record.of(self.simulation, self.snapshots)
 
 
 def ticks_of(seconds, until, simulation):

@@ -131,12 +131,12 @@ class LockstepDifferential:
                 raise TimeoutError(
                     f'no tick for {PATIENCE:g} s after {ticks - first} ticks: does a node answer '
                     '/differential/joint_states with /differential/torques?')
-        return Record(self.simulation, self.snapshots[first:])
+        return Record.of(self.simulation, self.snapshots[first:])
 
     @property
     def record(self):
         """The ``Record`` of all runs."""
-        return Record(self.simulation, self.snapshots)
+        return Record.of(self.simulation, self.snapshots)
 
     def _on_tick(self, snapshot):
         self.snapshots.append(snapshot)

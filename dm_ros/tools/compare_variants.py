@@ -12,7 +12,7 @@ from dm_ros.files.output import replacing
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.plot import require_matplotlib
 from dm_ros.files.torque_table import read_torque_file
-from dm_ros.motion.models import MODELS
+from dm_ros.mechanism.variants import MECHANISMS, SELF_LOCKING, SYMMETRIC
 from dm_ros.motion.simulation import checked
 from dm_ros.tools.comparison.claims import symmetric_claims
 from dm_ros.tools.comparison.claims_lsd import self_locking_claims
@@ -21,17 +21,15 @@ from dm_ros.tools.comparison.page import page
 from dm_ros.tools.comparison.runs import (
     BUILT_IN_SECONDS,
     Load,
-    MECHANISMS,
     run,
     ticks_of,
-    variants_of,
 )
 from dm_ros.tools.ending import run_tool
 from dm_ros.tools.progress import progress
 
 TABLE_SECONDS = 30.0   # of a CSV, without --duration
 PAGE = 'index.html'
-CLAIMS = {'symmetric': symmetric_claims, 'lsd': self_locking_claims}
+CLAIMS = {SYMMETRIC: symmetric_claims, SELF_LOCKING: self_locking_claims}
 EPILOG = """\
 The page shows, for each mechanism, what each variant is, gives and costs, how far it is from the
 exact solution at 100 Hz, 1 kHz and 10 kHz, what the paper says in words beside what is measured
@@ -65,18 +63,19 @@ def parser():
 
 
 def loads(arguments):
-    """Return ``{mechanism: Load}`` for the command line, and what they are in words."""
+    """Return ``{Mechanism: Load}`` for the command line, and what they are in words."""
     seconds = arguments.duration
     if seconds is not None:
         checked('duration', seconds, lambda v: v > 0.0, 'a positive number of seconds')
     if arguments.torques is None:
         chosen = [arguments.mechanism] if arguments.mechanism else MECHANISMS
-        return ({m: Load(m, seconds or BUILT_IN_SECONDS) for m in chosen},
+        return ({MECHANISMS[name]: Load(MECHANISMS[name], seconds or BUILT_IN_SECONDS)
+                 for name in chosen},
                 'The loads are built-in ones, in the manner of the paper.')
     if arguments.mechanism is None:
         raise ValueError('--torques needs --mechanism, as its columns are the shafts of one')
-    mechanism = arguments.mechanism
-    table = read_torque_file(arguments.torques, MODELS[variants_of(mechanism)[0]][0].inputs)
+    mechanism = MECHANISMS[arguments.mechanism]
+    table = read_torque_file(arguments.torques, mechanism.inputs)
     whole = table.times[-1]
     used = min(whole, seconds or TABLE_SECONDS)
     part = '' if used == whole else f', the first {used:g} of {whole:g} s'
@@ -103,7 +102,7 @@ def compare(arguments):
                                  else error) from None
             images = {}
             for name, (which, draw, _) in FIGURES.items():
-                if which == mechanism:
+                if which is mechanism:
                     picture = BytesIO()
                     draw(runs).savefig(picture, format='png')
                     images[name] = picture.getvalue()

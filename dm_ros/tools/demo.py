@@ -17,9 +17,7 @@ import subprocess
 import sys
 import time
 
-from dm_ros.files.output import replacing, write_csv
-from dm_ros.files.plot import save_plot
-from dm_ros.motion.models import VARIANTS
+from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.ros.domain import own_domain
 from dm_ros.ros.recorder import Recorder
 from dm_ros.tools.progress import progress
@@ -85,7 +83,7 @@ def next_report(recorder):
     return condition
 
 
-def record(arguments):
+def run_processes(arguments):
     """Return the recorder after a run of the two processes."""
     namespace = f'/demo_{os.getpid()}'   # even in a shared domain nobody else is heard
     parameters = ['--ros-args', '-r', f'__ns:={namespace}', '-p', f'variant:={arguments.variant}',
@@ -111,20 +109,20 @@ def record(arguments):
     return recorder
 
 
-def report(columns, recorder, rate):
+def report(record, missed, rate):
     """Return the report as lines."""
-    time_, flow = columns['time'], columns['power_flow']
+    time_, flow = record.time, record.power_flow
     span = time_[-1] - time_[0]
     lines = [
         f'recorded      {len(time_)} ticks in {span:.2f} s',
         f'rate held     {(len(time_) - 1) / span:.2f} Hz of {rate:g} Hz',
-        f'missed ticks  {recorder.missed}',
+        f'missed ticks  {missed}',
         f'power flow    direct {100 * (flow > 0).mean():.0f} %, '
         f'reverse {100 * (flow < 0).mean():.0f} %',
         '',
         f'{"":24}{"lowest":>12}{"highest":>12}']
     units = {'velocity': 'rad/s', 'moment': 'N m', 'torque': 'N m'}
-    for name, values in columns.items():
+    for name, values in record.columns.items():
         kind, _, what = name.partition('.')
         if kind in units:
             lines.append(f'{kind + " " + what:24}{values.min():12.2f}{values.max():12.2f}'
@@ -142,19 +140,19 @@ def main(args=None):
         arguments.out.mkdir(parents=True, exist_ok=True)
         with own_domain() as domain:
             os.environ['ROS_DOMAIN_ID'] = str(domain)
-            recorder = record(arguments)
-        columns = recorder.columns(arguments.duration)
+            recorder = run_processes(arguments)
+        record = recorder.record(arguments.duration,
+                                 f'{arguments.variant} at {arguments.rate:g} Hz')
         csv = arguments.out / f'{arguments.variant}.csv'
         png = arguments.out / f'{arguments.variant}.png'
-        write_csv(columns, csv)
-        with replacing(png, 'wb') as file:
-            save_plot(columns, file, f'{arguments.variant} at {arguments.rate:g} Hz')
+        record.save_csv(csv)
+        record.save_plot(png)
     except KeyboardInterrupt:
         return 128 + signal.SIGINT
     except (OSError, RuntimeError, ValueError) as error:
         print(f'demo: {error}', file=sys.stderr)
         return 1
-    print('\n'.join(report(columns, recorder, arguments.rate)))
+    print('\n'.join(report(record, recorder.missed, arguments.rate)))
     print(f'\nwritten       {csv}\n              {png}')
     return 0
 

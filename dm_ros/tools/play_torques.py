@@ -17,8 +17,7 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 
 from dm_ros.files.torque_table import read_torque_file
-from dm_ros.mechanism.loads import PROFILES
-from dm_ros.motion.models import MODELS, VARIANTS
+from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
@@ -38,7 +37,7 @@ def parser():
     family.add_argument('--variant', choices=VARIANTS, default='symmetric_ode',
                         help='the variant that the node runs: it decides the input shafts and '
                         'the built-in load; default: %(default)s')
-    family.add_argument('--profile', choices=PROFILES, help='the same by the mechanism alone')
+    family.add_argument('--profile', choices=MECHANISMS, help='the same by the mechanism alone')
     result.add_argument('--torques', metavar='FILE', help='play this CSV, not the built-in load')
     result.add_argument('--rate', type=_positive, default=100.0, metavar='HZ',
                         help='messages in a second; default: 100')
@@ -124,18 +123,17 @@ def load(arguments):
     :raises ValueError: for a CSV that is not as it should be.
     """
     rate, count = arguments.rate, None
-    family = arguments.profile or arguments.variant.split('_')[0]
-    inputs = next(model.inputs for variant, (model, _) in MODELS.items()
-                  if variant.startswith(family))
+    mechanism = (MECHANISMS[arguments.profile] if arguments.profile
+                 else variant_named(arguments.variant).mechanism)
     if arguments.torques:
-        held = read_torque_file(arguments.torques, inputs).held(1 / rate)
+        held = read_torque_file(arguments.torques, mechanism.inputs).held(1 / rate)
         torques_at, count = held.at, len(held)
     else:
         def torques_at(n):
-            return PROFILES[family](n / rate)
+            return mechanism.load(n / rate)
     if arguments.duration:
         count = max(1, round(arguments.duration * rate))
-    return inputs, torques_at, count
+    return mechanism.inputs, torques_at, count
 
 
 def main(args=None):

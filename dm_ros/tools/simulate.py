@@ -11,11 +11,13 @@ import sys
 
 import numpy as np
 
-from dm_ros.files.output import as_row, column_names, replacing
+from dm_ros.files.columns import as_row, column_names, write_csv
+from dm_ros.files.output import replacing
 from dm_ros.files.parameter_file import read_parameter_file
-from dm_ros.files.plot import require_matplotlib, save_plot
+from dm_ros.files.plot import require_matplotlib
+from dm_ros.files.record import Record
 from dm_ros.files.torque_table import read_torque_file
-from dm_ros.motion.models import VARIANTS
+from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.settings import make_simulation, NodeParameters
 from dm_ros.tools.ending import run_tool
 from dm_ros.tools.progress import progress
@@ -52,29 +54,18 @@ def parser():
     return result
 
 
-def write_record(simulation, torques, file=None, record=None):
-    """
-    Run a simulation and write the start and the end of each tick.
-
-    :param torques: sized iterable, the torques of each tick.
-    :param file: text file that gets CSV.
-    :param record: array of doubles that gets the rows one after the other.
-    """
-    names = column_names(simulation)
-    line = ','.join(['%.17g'] * (len(names) - 1)) + ',%d\n'
-
-    def write(row):
-        if file is not None:
-            file.write(line % row)
-        if record is not None:
-            record.extend(row)
-
-    if file is not None:
-        file.write(','.join(names) + '\n')
-    write(as_row(simulation.snapshot()))
-    step = simulation.step
+def rows_of(simulation, torques):
+    """Run a simulation; yield the start and the end of each tick as rows of a record."""
+    yield as_row(simulation.snapshot())
     for torque in progress(torques, total=len(torques)):
-        write(as_row(step(torque)))
+        yield as_row(simulation.step(torque))
+
+
+def kept(rows, numbers):
+    """Yield rows and keep their numbers in an array."""
+    for row in rows:
+        numbers.extend(row)
+        yield row
 
 
 def run(arguments):
@@ -93,23 +84,24 @@ def run(arguments):
     except ValueError as error:
         raise ValueError(f'{arguments.torques}: {error}') from None
     with ExitStack() as stack:
-        picture = record = file = None
+        rows, numbers = rows_of(simulation, torques), array('d')
         if arguments.plot:
-            picture, record = stack.enter_context(replacing(arguments.plot, 'wb')), array('d')
+            picture = stack.enter_context(replacing(arguments.plot, 'wb'))
+            rows = kept(rows, numbers)
         if arguments.out:
             file = stack.enter_context(replacing(arguments.out, 'w'))
-        elif not picture:
+        elif arguments.plot:
+            file = stack.enter_context(open(os.devnull, 'w'))
+        else:
             # a file of its own: the interpreter stumbles at its end over a sys.stdout that failed
             file = stack.enter_context(open(1, 'w', closefd=False))
         try:
-            write_record(simulation, torques, file, record)
+            write_csv(file, column_names(simulation), rows)
         except ValueError as error:
             raise ValueError(f'{arguments.torques}: after {simulation.time:g} s: '
                              f'{error}') from None
-        if picture:
-            names = column_names(simulation)
-            columns = np.frombuffer(record).reshape(-1, len(names)).T
-            save_plot(dict(zip(names, columns, strict=True)), picture, arguments.variant)
+        if arguments.plot:
+            Record(simulation, np.frombuffer(numbers), arguments.variant).draw(picture)
     speeds = zip(simulation.shafts, simulation.snapshot().velocity, strict=True)
     print(f'simulate: {len(torques)} ticks, {simulation.time:.6g} s, final speeds in rad/s:',
           ', '.join(f'{shaft} {speed:.6g}' for shaft, speed in speeds), file=sys.stderr)

@@ -11,7 +11,7 @@ import pytest
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
-from dm_ros.mechanism.loads import PROFILES
+from dm_ros.mechanism.variants import MECHANISMS
 
 TOOL = [sys.executable, '-m', 'dm_ros.tools.play_torques']
 
@@ -50,7 +50,7 @@ def test_plays_a_built_in_load_and_ends_with_zero(ros, play, arguments, profile,
     ros.until(lambda: messages and not any(messages[-1].effort))
     assert process.returncode == 0
     *played, last = messages
-    load = PROFILES[profile]
+    load = MECHANISMS[profile].load
     expected = [list(load(n / 200)) for n in range(100)]
     # a machine that is late skips messages, so not every one of the hundred must be there
     assert len(played) <= 100 and list(played[0].effort) == expected[0]

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dm_ros.tools.comparison.measures import difference, relative_rms, switches
+from dm_ros.mechanism.variants import SYMMETRIC
+from dm_ros.tools.comparison.measures import difference, relative_rms, switches, three_speeds
 from dm_ros.tools.comparison.runs import RATE, RATES
 
 FOUND, PARTLY, OTHERWISE, SILENT = 'found', 'in part', 'not found', 'load does not show it'
@@ -40,13 +41,13 @@ def change(new, old):
 
 def identical(runs):
     ode, dae = runs.records['symmetric_ode', RATE], runs.records['symmetric_dae', RATE]
-    apart = np.abs(dae.main_speeds() - ode.main_speeds()).max()
+    apart = np.abs(three_speeds(dae) - three_speeds(ode)).max()
     median = np.median(relative_rms(dae, ode))
     return Claim(
         '3.5.2', 'Signals of the two variants are almost identical.',
         f'Speeds differ by at most {apart:.1e} rad/s; the root mean square of the relative '
         f'difference (Figure 4) is {median:.1e} in the median: rounding.',
-        verdict(apart <= 1e-9 * max(1.0, np.abs(ode.main_speeds()).max())))
+        verdict(apart <= 1e-9 * max(1.0, np.abs(three_speeds(ode)).max())))
 
 
 def switching_delay(runs):
@@ -54,9 +55,9 @@ def switching_delay(runs):
     ticks = changes = late = 0
     for rate in RATES:
         ode, dae = runs.records['symmetric_ode', rate], runs.records['symmetric_dae', rate]
-        ticks += len(ode.index)
-        changes += len(switches(ode.index))
-        late += int((ode.index != dae.index).sum())
+        ticks += len(ode.power_flow)
+        changes += len(switches(ode.power_flow))
+        late += int((ode.power_flow != dae.power_flow).sum())
     if not changes:
         return Claim('3.5.2', paper, 'The power flow never switches.', SILENT)
     return Claim(
@@ -84,7 +85,7 @@ def tolerance(runs):
 
 def counter_rotation(runs):
     r = runs.records['symmetric_ode', RATE]
-    part = np.mean(r.speed['left'] * r.speed['right'] < 0.0)
+    part = np.mean(r.velocity['left'] * r.velocity['right'] < 0.0)
     return Claim(
         '3.5.1', 'The side gears turn in opposite directions, as the left torque is the larger.',
         f'Left and right have opposite signs {percent(part)} of the time.',
@@ -100,7 +101,7 @@ def cost(runs):
         '5', 'Variant 1 computes fastest; the others are slower.',
         f'Time of a step relative to {first}, in this run: {words}. Whatever is constant is '
         'solved once, so the size of the matrices does not reach the step'
-        + ('.' if runs.mechanism == 'symmetric' else
+        + ('.' if runs.mechanism is SYMMETRIC else
            ', and four sign patterns of M take the place of the iteration.'),
         verdict(slower))
 

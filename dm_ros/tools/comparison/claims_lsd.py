@@ -9,6 +9,7 @@ import numpy as np
 
 from dm_ros.tools.comparison.claims import change, Claim, cost, percent, SILENT, verdict
 from dm_ros.tools.comparison.measures import (
+    all_moments,
     CLEAR,
     difference,
     gear_share,
@@ -20,6 +21,7 @@ from dm_ros.tools.comparison.measures import (
     rms,
     SLIDING,
     switches,
+    three_speeds,
     TRANSITION,
 )
 from dm_ros.tools.comparison.runs import RATE, RATES
@@ -84,9 +86,9 @@ def good_speeds(runs):
 def locked(runs):
     paper = 'There are sections where the speeds of carrier and outputs coincide.'
     record = runs.records['lsd_ode', RATE]
-    mask = np.abs(record.slip()) < LOCKED
-    creep = rms(record.slip()[mask]) if mask.any() else 0.0
-    without = np.mean(np.abs(runs.without.slip()) < LOCKED)
+    mask = np.abs(record.slip) < LOCKED
+    creep = rms(record.slip[mask]) if mask.any() else 0.0
+    without = np.mean(np.abs(runs.without.slip) < LOCKED)
     return Claim(
         '4.8.2', paper,
         f'Locked, with less than {LOCKED:g} rad/s of slip, {percent(mask.mean())} of the time; '
@@ -98,7 +100,7 @@ def locked(runs):
 
 def friction_signs(runs):
     record = runs.records['lsd_ode', RATE]
-    carrier, front, rear = record.main_speeds().T
+    carrier, front, rear = three_speeds(record).T
     power = np.minimum(record.moment['front_clutch'] * (front - carrier),
                        record.moment['rear_clutch'] * (rear - carrier))
     part = np.mean(power >= 0.0)
@@ -110,9 +112,10 @@ def friction_signs(runs):
 
 def growth(runs):
     with_, without = runs.records['lsd_ode', RATE], runs.without
-    speeds = [f'{name} {np.abs(with_.speed[name]).max():.0f} to '
-              f'{np.abs(without.speed[name]).max():.0f}' for name in ('carrier', 'front', 'rear')]
-    grown = rms(without.main_speeds()) / max(rms(with_.main_speeds()), 1e-300)
+    largest = {name: [np.abs(r.velocity[name]).max() for r in (with_, without)]
+               for name in ('carrier', 'front', 'rear')}
+    speeds = [f'{name} {a:.0f} to {b:.0f}' for name, (a, b) in largest.items()]
+    grown = rms(three_speeds(without)) / max(rms(three_speeds(with_)), 1e-300)
     return Claim(
         '4.8.2', 'Without proportional friction the angular speeds grow essentially.',
         f'Largest speeds, in rad/s: {", ".join(speeds)}; root mean square '
@@ -143,9 +146,9 @@ def gear_growth(runs):
 
 def two_and_three(runs):
     ode, dae = runs.records['lsd_ode', RATE], runs.records['lsd_dae', RATE]
-    apart = np.abs(dae.main_speeds() - ode.main_speeds()).max(axis=1)
-    moments = np.abs(dae.moments() - ode.moments()).max()
-    changes = switches(ode.index)
+    apart = np.abs(three_speeds(dae) - three_speeds(ode)).max(axis=1)
+    moments = np.abs(all_moments(dae) - all_moments(ode)).max()
+    changes = switches(ode.power_flow)
     first = changes[0] if len(changes) else len(apart)
     before = apart[:first].max()
     after = apart[first:].max(initial=0.0)
@@ -161,12 +164,12 @@ def two_and_three(runs):
 def steady_direction(runs):
     paper = 'The fewer changes of direction, the closer the variants.'
     lagged, ode = runs.records['lsd_lagged', RATE], runs.records['lsd_ode', RATE]
-    apart = np.abs(lagged.main_speeds() - ode.main_speeds()).max(axis=1)
-    changes = switches(ode.index)
+    apart = np.abs(three_speeds(lagged) - three_speeds(ode)).max(axis=1)
+    changes = switches(ode.power_flow)
     if not len(changes):
         return Claim('4.8.1', paper, 'The direction never changes.', SILENT)
     mask = near(changes, len(apart), round(TRANSITION * RATE))
-    free = np.abs(ode.slip()) >= LOCKED
+    free = np.abs(ode.slip) >= LOCKED
     parts = [rms(apart[part]) if part.any() else 0.0 for part in (mask, ~mask, ~free, free)]
     before, after = apart[:changes[0]].max(), apart[changes[0]:].max()
     return Claim(

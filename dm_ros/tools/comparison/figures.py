@@ -6,8 +6,9 @@
 import numpy as np
 
 from dm_ros.files.plot import COLORS
-from dm_ros.tools.comparison.measures import difference, relative_rms
-from dm_ros.tools.comparison.runs import RATE, RATES, variants_of
+from dm_ros.mechanism.variants import SELF_LOCKING, SYMMETRIC, variants_of
+from dm_ros.tools.comparison.measures import all_moments, difference, relative_rms
+from dm_ros.tools.comparison.runs import RATE, RATES
 
 AXES = ('carrier', 'left', 'right', 'front', 'rear')
 VARIANT_COLORS = {'symmetric_ode': '#222222', 'symmetric_dae': '#d1441f',
@@ -63,8 +64,8 @@ def finish(ax, time):
 def draw_index(ax, title, record):
     """Draw the power-flow index."""
     ax.set_title(title, loc='left', fontsize=10)
-    ax.step(record.time, record.index, where='pre', color='#222222', linewidth=1.1)
-    ax.fill_between(record.time, -1.5, 1.5, where=record.index < 0, step='pre',
+    ax.step(record.time, record.power_flow, where='pre', color='#222222', linewidth=1.1)
+    ax.fill_between(record.time, -1.5, 1.5, where=record.power_flow < 0, step='pre',
                     color='#d1441f', alpha=0.12, linewidth=0)
     ax.set_ylim(-1.5, 1.5)
     ax.set_yticks([-1, 1], ['−1 reverse', '+1 direct'])
@@ -72,7 +73,7 @@ def draw_index(ax, title, record):
 
 
 def main_speeds(record):
-    return {name: values for name, values in record.speed.items() if name in AXES}
+    return {name: values for name, values in record.velocity.items() if name in AXES}
 
 
 def deltas(to, base):
@@ -85,14 +86,14 @@ def figure_3(runs):
     figure = new_figure('Figure 3: symmetric differential, variant 1', 10, 8.2)
     a, b, c = figure.subplots(3, height_ratios=[1.0, 1.5, 0.5])
     draw(a, '(a) external load', 'torque, N m', r.time, r.torque, held=True)
-    draw(b, '(b) angular speeds of the elements', 'speed, rad/s', r.time, r.speed)
+    draw(b, '(b) angular speeds of the elements', 'speed, rad/s', r.time, r.velocity)
     draw_index(c, '(c) power-flow index', r)
     return figure
 
 
 def figure_4(runs):
     """Draw the root mean square of the relative difference of the symmetric variants."""
-    first, second = (runs.records[variant, RATE] for variant in variants_of('symmetric'))
+    first, second = (runs.records[variant, RATE] for variant in variants_of(SYMMETRIC))
     figure = new_figure('Figure 4: the two symmetric variants, root mean square of the '
                         'relative difference', 10, 3.6)
     ax = figure.subplots()
@@ -112,7 +113,7 @@ def figure_4(runs):
 
 def figure_7(runs):
     """Draw the self-locking differential and how far its variants are apart."""
-    lagged, ode, dae = (runs.records[variant, RATE] for variant in variants_of('lsd'))
+    lagged, ode, dae = (runs.records[variant, RATE] for variant in variants_of(SELF_LOCKING))
     figure = new_figure('Figure 7: self-locking differential, variant 2, and its differences '
                         'to the others', 12, 10)
     (a, b), (c, d), (f, g) = figure.subplots(3, 2, height_ratios=[1.35, 1.0, 1.0])
@@ -123,7 +124,7 @@ def figure_7(runs):
     for ax, title, other in ((f, '(f) variant 2 − variant 1', lagged),
                              (g, '(g) variant 2 − variant 3', dae)):
         draw(ax, title, 'difference, rad/s', ode.time,
-             deltas(main_speeds(ode), other.speed))
+             deltas(main_speeds(ode), other.velocity))
     return figure
 
 
@@ -134,7 +135,7 @@ def figure_8(runs):
                         'less with it, variant 2', 10, 7)
     a, b = figure.subplots(2)
     draw(a, '(a) angular speeds', 'difference, rad/s', base.time,
-         deltas(main_speeds(without), base.speed))
+         deltas(main_speeds(without), base.velocity))
     draw(b, '(b) internal torques', 'difference, N m', base.time,
          deltas(without.moment, base.moment))
     return figure
@@ -182,32 +183,32 @@ def figure_lag(runs):
 
 def window_of(lagged, exact, rate):
     """Return first and last tick of the half second in which the rear clutch is worst met."""
-    ticks = len(exact.index)
+    ticks = len(exact.power_flow)
     width = min(ticks, max(2, rate // 2))
-    error = np.cumsum(np.concatenate([[0.0], (lagged.moments()[:, 3] - exact.moment[:, 3])**2]))
+    error = np.cumsum(np.concatenate([[0.0], (all_moments(lagged)[:, 3] - exact.moment[:, 3])**2]))
     start = int(np.argmax(error[width:] - error[:-width]))
     return start, start + width
 
 
 FIGURES = {   # file: (mechanism, how it is drawn, what is seen)
-    'figure-3.png': ('symmetric', figure_3, """
+    'figure-3.png': (SYMMETRIC, figure_3, """
         As in the paper the torques on left and right are in phase, the left a little larger, and
         the carrier gets nearly the opposite of their sum; so the outputs run apart in opposite
         directions, and what is left over swings the carrier to and fro. The final drive ratio
         is positive here, hence the sign of the pinion."""),
-    'figure-4.png': ('symmetric', figure_4, """
+    'figure-4.png': (SYMMETRIC, figure_4, """
         At each tick over the speeds of all five elements and the index, relative to variant 1.
         Peaks stand where a speed passes through zero, so that next to nothing is divided by;
         less than 1e-9 of the largest speed counts as rest and is left out."""),
-    'figure-7.png': ('lsd', figure_7, """
+    'figure-7.png': (SELF_LOCKING, figure_7, """
         M₁ and M₂ are the gear moments, F₁ and F₂ the clutch moments of front and rear; M is
         positive when the mechanism drives the shaft, in both directions of flow. Mind the
         scale of (g). The paper has no part (e)."""),
-    'figure-8.png': ('lsd', figure_8, """
+    'figure-8.png': (SELF_LOCKING, figure_8, """
         The same load with the pressure angle 0, which leaves the preload friction alone. To get
         the curves without proportional friction, add these to Figure 7. Where ΔM and ΔF of a
         shaft coincide, its mesh had to carry the moment of its clutch on top of the load."""),
-    'lag.png': ('lsd', figure_lag, """
+    'lag.png': (SELF_LOCKING, figure_lag, """
         Left: the difference to the exact solution without lag. Right: the half second in which
         the rear clutch moment of the lagged variant is furthest from it."""),
 }

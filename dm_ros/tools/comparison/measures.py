@@ -19,6 +19,16 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+def three_speeds(record):
+    """Return the speeds of the carrier and the two output shafts, (ticks, 3)."""
+    return np.column_stack(list(record.velocity.values())[:3])
+
+
+def all_moments(record):
+    """Return the internal moments, (ticks, moments)."""
+    return np.column_stack(list(record.moment.values()))
+
+
 class Difference(NamedTuple):
     """How far a run is from another."""
 
@@ -33,12 +43,12 @@ class Difference(NamedTuple):
 
 def difference(record, exact):
     """Return the ``Difference`` of a ``Record`` from an ``Exact``."""
-    speeds, moments = record.main_speeds(), record.moments()
+    speeds, moments = three_speeds(record), all_moments(record)
     speed, moment = speeds - exact.speed, moments - exact.moment
     return Difference(
         float(np.abs(speed).max()), rms(speed), float(np.abs(moment).max()), rms(moment),
         share(rms(speed), rms(exact.speed)), share(rms(moment), rms(exact.moment)),
-        int((record.index != exact.index).sum()))
+        int((record.power_flow != exact.power_flow).sum()))
 
 
 def share(part, whole):
@@ -61,7 +71,7 @@ def relative_rms(record, base):
     A quotient counts as zero where the speed is at rest: below 1e-9 of its largest.
     """
     def signals(r):
-        return np.column_stack([*r.speed.values(), r.index])
+        return np.column_stack([*r.velocity.values(), r.power_flow])
     change, of = signals(record) - signals(base), signals(base)
     moves = np.abs(of) > 1e-9 * np.abs(of).max(axis=0)
     quotient = np.divide(change, of, out=np.zeros_like(of), where=moves)
@@ -83,7 +93,7 @@ def near(ticks, count, width):
 
 def gear_share(record):
     """Return M_1/(M_1 + M_2) of the ticks where the sum exceeds a tenth of its largest."""
-    M_1, M_2 = record.moments()[:, :2].T
+    M_1, M_2 = all_moments(record)[:, :2].T
     total = M_1 + M_2
     mask = np.abs(total) > 0.1 * np.abs(total).max()
     return M_1[mask] / total[mask], mask
@@ -97,9 +107,9 @@ def longest_stretch(mask):
 
 def steady_sliding(record, exact, rate):
     """Return the ticks that are in steady sliding in both, far from any change of state."""
-    sliding = exact.index == record.index
-    for index, slip in ((record.index, record.slip()),
-                        (exact.index, exact.speed[:, 1] - exact.speed[:, 2])):
+    sliding = exact.power_flow == record.power_flow
+    for index, slip in ((record.power_flow, record.slip),
+                        (exact.power_flow, exact.speed[:, 1] - exact.speed[:, 2])):
         sliding &= np.abs(slip) > SLIDING
         sliding[switches(index)] = False
     width = max(MOST_LAG, round(CLEAR * rate))
@@ -121,7 +131,7 @@ def lags(record, exact, rate):
         return np.full(exact.moment.shape[1], np.nan)
     shifts = np.arange(-MOST_LAG, MOST_LAG + 1)
     found = []
-    for ours, theirs in zip(record.moments().T, exact.moment.T, strict=True):
+    for ours, theirs in zip(all_moments(record).T, exact.moment.T, strict=True):
         misfit = np.array([np.mean((ours[ticks] - theirs[ticks - k])**2) for k in shifts])
         best = min(max(int(misfit.argmin()), 1), len(shifts) - 2)
         before, here, after = misfit[best - 1:best + 2]

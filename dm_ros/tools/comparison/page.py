@@ -7,44 +7,28 @@ from base64 import b64encode
 from html import escape
 import os
 import platform
-from typing import NamedTuple
 
 import numpy as np
 import scipy
 
+from dm_ros.mechanism.variants import CATALOGUE, SELF_LOCKING, SYMMETRIC, variants_of
 from dm_ros.tools.comparison.claims import FOUND, OTHERWISE, PARTLY, SILENT
 from dm_ros.tools.comparison.figures import FIGURES
 from dm_ros.tools.comparison.measures import difference
-from dm_ros.tools.comparison.runs import PASSES, RATE, RATES, TIMED_TICKS, variants_of
+from dm_ros.tools.comparison.runs import PASSES, RATE, RATES, TIMED_TICKS
 
-
-class Nature(NamedTuple):
-    """What a variant is."""
-
-    paper: str
-    unknowns: str
-    matrix: int      # rows and columns
-    direct: str      # what a solution holds
-    recovered: str   # what must be computed from it
-
-
-NATURES = {
-    'symmetric_ode': Nature(
-        '3.3, variant 1', 'ε₁ ε₂', 2, 'speeds of the outputs',
-        'speeds of carrier, pinion, satellite, (5); all three moments, (10), (17)'),
-    'symmetric_dae': Nature(
-        '3.4, variant 2', 'ε₀ ε₁ ε₂ ε₃ εₛ M_F M₁ M₂', 8, 'all speeds, all moments', 'nothing'),
-    'lsd_lagged': Nature(
-        '4.5, variant 1', 'ε₁ ε₂', 2, 'speeds of the outputs',
+GIVEN = {   # what a solution of a variant holds, and what must be computed from it
+    'symmetric_ode': ('speeds of the outputs',
+                      'speeds of carrier, pinion, satellite, (5); all three moments, (10), (17)'),
+    'symmetric_dae': ('all speeds, all moments', 'nothing'),
+    'lsd_lagged': (
+        'speeds of the outputs',
         'speeds of carrier and satellite, (53); M, (68), (70); F from |M| of the last step'),
-    'lsd_ode': Nature(
-        '4.6, variant 2', 'ε₁ ε₂ M₁ M₂', 4, 'speeds of the outputs, M',
-        'speeds of carrier and satellite, (53); F, (56)'),
-    'lsd_dae': Nature(
-        '4.7, variant 3', 'ε₀ ε₁ ε₂ εₛ M₁ M₂', 6, 'all speeds, M', 'F, (56)'),
+    'lsd_ode': ('speeds of the outputs, M', 'speeds of carrier and satellite, (53); F, (56)'),
+    'lsd_dae': ('all speeds, M', 'F, (56)'),
 }
-TITLES = {'symmetric': 'Symmetric differential with final drive',
-          'lsd': 'Asymmetric self-locking differential'}
+TITLES = {SYMMETRIC: 'Symmetric differential with final drive',
+          SELF_LOCKING: 'Asymmetric self-locking differential'}
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 1100px;
        margin: 2em auto; padding: 0 1em; }
@@ -88,9 +72,9 @@ def judgement(runs):
     """Return the table of what the variants are and cost."""
     rows = []
     for variant, cost in runs.costs.items():
-        nature = NATURES[variant]
-        rows.append([code(variant), nature.paper, nature.unknowns,
-                     f'{nature.matrix}×{nature.matrix}', nature.direct, nature.recovered,
+        nature, rows_of_matrix = CATALOGUE[variant], len(CATALOGUE[variant].unknowns.split())
+        rows.append([code(variant), nature.section, nature.unknowns,
+                     f'{rows_of_matrix}×{rows_of_matrix}', *GIVEN[variant],
                      f'{cost.seconds * 1e6:.2f}', f'{cost.ratio:.2f}'])
     return table(['variant', 'paper', 'unknowns', 'matrix', 'given directly', 'recovered',
                   'µs a step', 'ratio'], rows, numbers=(6, 7), kind='natures')
@@ -103,7 +87,7 @@ def accuracy(runs):
     def row(variant, rate, words, exact):
         d = difference(runs.records[variant, rate], exact)
         rows.append([words, f'{rate:,} Hz', *(f'{value:.2g}' for value in d[:4]),
-                     f'{d.other_index} of {len(exact.index):,}'])
+                     f'{d.other_index} of {len(exact.power_flow):,}'])
     for variant in variants_of(runs.mechanism):
         rows.append(None)
         for rate in RATES:
@@ -184,7 +168,7 @@ def page(comparisons, source):
              f'beside the paper that they come from. {escape(source)} How it was measured is '
              'told <a href="#method">at the end</a>.</p>\n']
     for runs, found, images in comparisons:
-        parts += [f'<h2 id="{runs.mechanism}">{TITLES[runs.mechanism]}</h2>\n',
+        parts += [f'<h2 id="{runs.mechanism.name}">{TITLES[runs.mechanism]}</h2>\n',
                   f'<p>{runs.load.seconds:g} s of load; parameters: {differing(runs)}.</p>\n',
                   '<h3>What each variant is, gives and costs</h3>\n', judgement(runs),
                   '<h3>Difference to the exact solution</h3>\n', accuracy(runs),

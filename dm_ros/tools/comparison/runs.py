@@ -11,30 +11,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dm_ros.mechanism.loads import PROFILES
-from dm_ros.motion.models import VARIANTS
+from dm_ros.files.columns import as_row
+from dm_ros.files.record import Record
+from dm_ros.mechanism.variants import Mechanism, SELF_LOCKING, SYMMETRIC, variants_of
 from dm_ros.settings import make_simulation, NodeParameters
 from dm_ros.tools.comparison.reference import exact_self_locking, exact_symmetric
 
 RATES = (100, 1000, 10000)   # Hz, at which the variants are measured
 RATE = 1000                  # Hz, of figures, claims and timings
-MECHANISMS = ('symmetric', 'lsd')
 BUILT_IN_SECONDS = 10.0      # length of a built-in load
 TIMED_TICKS, PASSES = 5000, 7
-
-
-def variants_of(mechanism):
-    """Return the variants of a mechanism, in the order of the paper."""
-    return tuple(v for v in VARIANTS if v.split('_')[0] == mechanism)
 
 
 class Load:
     """A load, built-in or from a table, that can be held in ticks of any length."""
 
     def __init__(self, mechanism, seconds, table=None):
-        """Take ``seconds`` of a ``TorqueTable``, or of the built-in load of the mechanism."""
-        self.mechanism, self.seconds = mechanism, seconds
-        self._profile, self._table = PROFILES[mechanism], table
+        """Take ``seconds`` of a ``TorqueTable``, or of the reference load of a ``Mechanism``."""
+        self.mechanism, self.seconds, self._table = mechanism, seconds, table
 
     def held(self, rate):
         """Return the torques of each tick, N m; raise ValueError where there is no tick."""
@@ -42,46 +36,17 @@ class Load:
         if ticks < 2:
             raise ValueError(f'duration: {self.seconds:g} s make no run at {rate} Hz')
         if self._table is None:
-            return [self._profile(n / rate) for n in range(ticks)]
+            return [self.mechanism.load(n / rate) for n in range(ticks)]
         return list(islice(self._table.held(1 / rate), ticks))
 
 
-class Record(NamedTuple):
-    """A run: each entry is an array over the ticks, at their ends."""
-
-    time: np.ndarray    # s
-    speed: dict         # rad/s, by shaft
-    moment: dict        # N m, by name
-    torque: dict        # N m, by input shaft
-    index: np.ndarray   # +1 or -1
-
-    def main_speeds(self):
-        """Return the speeds of the carrier and the two output shafts, (ticks, 3)."""
-        return np.column_stack(list(self.speed.values())[:3])
-
-    def moments(self):
-        """Return the internal moments, (ticks, moments)."""
-        return np.column_stack(list(self.moment.values()))
-
-    def slip(self):
-        """Return the speed of the first output shaft less that of the second, rad/s."""
-        _, first, second = self.main_speeds().T
-        return first - second
-
-
 def record(simulation, torques, tick):
-    """Run a simulation and return its ``Record``."""
+    """Run a simulation and return its ``Record``, without the start."""
     rows = array('d')
     for T in torques:
-        s = simulation.step(T)
-        rows.extend((s.time, *s.velocity, *s.moment, *s.torque, s.power_flow))
+        rows.extend(as_row(simulation.step(T)))
         tick()
-    columns = iter(np.frombuffer(rows).reshape(len(torques), -1).T.copy())
-
-    def named(names):
-        return {name: next(columns) for name in names}
-    return Record(next(columns), named(simulation.shafts), named(simulation.moments),
-                  named(simulation.inputs), next(columns).astype(int))
+    return Record(simulation, np.frombuffer(rows), simulation.variant)
 
 
 class Cost(NamedTuple):
@@ -94,7 +59,7 @@ class Cost(NamedTuple):
 class Runs(NamedTuple):
     """All runs of one mechanism."""
 
-    mechanism: str
+    mechanism: Mechanism
     parameters: object   # of the mechanism
     load: Load
     records: dict        # Record by (variant, rate)
@@ -108,7 +73,7 @@ def exact_of(simulation, torques, deadband, tick, frozen=False):
     """Return the ``Exact`` solution of what a simulation at its start will do."""
     first = simulation.snapshot()
     common = simulation.parameters, torques, simulation.dt, first.velocity[1:3], deadband, tick
-    if simulation.variant.startswith('symmetric'):
+    if simulation.mechanism is SYMMETRIC:
         return exact_symmetric(*common)
     at_start = tuple(map(abs, first.moment[:2]))
     return exact_self_locking(*common, frozen=at_start if frozen else None)
@@ -116,10 +81,10 @@ def exact_of(simulation, torques, deadband, tick, frozen=False):
 
 def ticks_of(mechanism, load):
     """Return how many ticks ``run`` takes in all."""
-    recorded = len(variants_of(mechanism)) + (2 if mechanism == 'lsd' else 1)
+    recorded = len(variants_of(mechanism)) + (2 if mechanism is SELF_LOCKING else 1)
     timed = min(TIMED_TICKS, round(load.seconds * RATE)) * PASSES * len(variants_of(mechanism))
     return (sum(round(load.seconds * rate) * recorded for rate in RATES) + timed
-            + round(load.seconds * RATE) * (mechanism == 'lsd'))
+            + round(load.seconds * RATE) * (mechanism is SELF_LOCKING))
 
 
 def run(mechanism, load, values, tick):
@@ -133,7 +98,7 @@ def run(mechanism, load, values, tick):
     values = {**values, 'substeps': 1}
     deadband = NodeParameters().changed(NodeParameters.part_of(values)).deadband
     first, *_ = variants = variants_of(mechanism)
-    lsd = mechanism == 'lsd'
+    lsd = mechanism is SELF_LOCKING
     records, exact, frozen = {}, {}, {}
     for rate in RATES:
         torques = load.held(rate)

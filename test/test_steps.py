@@ -3,7 +3,7 @@
 
 """The fixed-step integrators are right beside exact and adaptive solutions."""
 
-from mechanisms import BOTH, random_self_locking, random_symmetric, relative_difference
+from mechanisms import BOTH, Flow, random_self_locking, random_symmetric, relative_difference
 import numpy as np
 import pytest
 from scipy.integrate import odeint, solve_ivp
@@ -11,26 +11,11 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from dm_ros import SelfLockingParameters, Simulation
-from dm_ros.mechanism import self_locking
-from dm_ros.mechanism.self_locking import SelfLockingOde
+from dm_ros.mechanism import clutched
 from dm_ros.mechanism.symmetric import SymmetricOde
-from dm_ros.motion import steppers
-from dm_ros.motion.steppers import (
-    apply_phi_2,
-    backward_euler,
-    ClutchStep,
-    held_torque_propagator,
-    HeldTorqueStep,
-    phi_2,
-    rosenbrock_part,
-)
-
-
-def clutch_step(p=None, **tolerance):
-    p = p or SelfLockingParameters()
-    return ClutchStep({d: SelfLockingOde(p).response(d) for d in BOTH},
-                      self_locking.slip_steepness(p), self_locking.full_friction(p), **tolerance)
-
+from dm_ros.motion import clutch, held_torque
+from dm_ros.motion.clutch import backward_euler, rosenbrock_part
+from dm_ros.motion.exponentials import apply_phi_2, held_propagator, phi_2
 
 # The exact step
 
@@ -42,11 +27,11 @@ def test_held_torque_step_is_the_solution_of_an_adaptive_solver(direction, h):
     for _ in range(3):
         response = SymmetricOde(random_symmetric(rng)).response(direction)
         x, u = rng.normal(0, 50, 2), rng.normal(0, 20, 3)
-        stepper = HeldTorqueStep({direction: response}, h)
+        k = held_torque.held_torque_step(response, h)
         solution = solve_ivp(
             lambda t, z, A=response.A, b=response.B @ u: np.concatenate([A @ z[:2] + b, z[:2]]),
             (0, h), [*x, 0, 0], 'DOP853', rtol=1e-13, atol=1e-13).y[:, -1]
-        speeds, integral = stepper.step(x, u, direction)
+        speeds, integral = held_torque.step(k, x, u)
         assert relative_difference(speeds, solution[:2]) < 1e-11
         assert relative_difference(integral, solution[2:]) < 1e-11
 
@@ -56,8 +41,8 @@ def test_two_half_steps_are_one_exact_step(h):
     rng = np.random.default_rng(2)
     for _ in range(10):
         r = SymmetricOde(random_symmetric(rng)).response(1)
-        Phi, Gamma, Psi, Theta = held_torque_propagator(r.A, r.B, h)
-        half_Phi, half_Gamma, half_Psi, half_Theta = held_torque_propagator(r.A, r.B, h / 2)
+        Phi, Gamma, Psi, Theta = held_propagator(r.A, r.B, h)
+        half_Phi, half_Gamma, half_Psi, half_Theta = held_propagator(r.A, r.B, h / 2)
         assert relative_difference(half_Phi @ half_Phi, Phi) < 1e-13
         assert relative_difference(half_Phi @ half_Gamma + half_Gamma, Gamma) < 1e-13
         assert relative_difference(half_Psi + half_Psi @ half_Phi, Psi) < 1e-13
@@ -135,13 +120,14 @@ def test_phi_2_of_a_number_is_its_series_or_definition(z):
 def test_jacobian_is_the_slope_of_the_slope(direction):
     rng = np.random.default_rng(4)
     for _ in range(100):
-        slope, jacobian = clutch_step(random_self_locking(rng)).flow(
-            tuple(rng.normal(0, 300, 3)), direction)
+        flow = Flow(random_self_locking(rng), rng.normal(0, 300, 3), direction)
         y, d = np.array([rng.normal(0, 30), rng.normal(0, 0.3)]), 1e-5
         differences = np.array([
-            np.subtract(slope(*(y + e))[:2], slope(*(y - e))[:2]) / (2 * d)
+            np.subtract(flow.point(*(y + e))[:4], flow.point(*(y - e))[:4]) / (2 * d)
             for e in d * np.eye(2)]).T
-        assert relative_difference(np.reshape(jacobian(slope(*y)), (2, 2)), differences) < 1e-6
+        J = np.reshape(flow.jacobian(*y), (4, 2))
+        assert relative_difference(J[:2], differences[:2]) < 1e-6
+        assert relative_difference(J[2:], differences[2:]) < 1e-6
 
 
 SLIPPING = SelfLockingParameters(c_f1=0.5, c_f2=0.5)
@@ -150,16 +136,15 @@ SLIPPING_TORQUE = (300.0, -100.0, -190.0)
 
 @pytest.mark.parametrize('order', [2, 3])
 def test_error_of_fixed_parts_falls_with_the_order(order):
-    slope, jacobian = clutch_step(SLIPPING).flow(SLIPPING_TORQUE, 1)
+    flow = Flow(SLIPPING, SLIPPING_TORQUE, 1)
     start, end = (40.0, 4.0), 0.04
-    exact = solve_ivp(lambda t, y: slope(*y)[:2], (0, end), start, 'DOP853',
+    exact = solve_ivp(lambda t, y: flow.point(*y)[:2], (0, end), start, 'DOP853',
                       rtol=1e-13, atol=1e-13).y[:, -1]
     errors = []
     for parts in (64, 128, 256, 512):
         y, h = np.array(start), end / parts
         for _ in range(parts):
-            here = slope(*y)
-            d, _, c = rosenbrock_part(slope, *y, here, jacobian(here), h)
+            d, _, c = rosenbrock_part(flow.k, flow.u, *y, flow.point(*y), flow.jacobian(*y), h)
             y = y + d + (np.array(c) if order == 3 else 0)
         errors.append(np.abs(y - exact).max())
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
@@ -167,12 +152,13 @@ def test_error_of_fixed_parts_falls_with_the_order(order):
 
 
 def test_integral_over_one_part_errs_with_the_fifth_power_of_its_length():
-    step, start, errors = clutch_step(SLIPPING, tolerance=1.0), (40.0, 4.0), []   # one part
-    slope, _ = step.flow(SLIPPING_TORQUE, 1)
+    flow, start, errors = Flow(SLIPPING, SLIPPING_TORQUE, 1), (40.0, 4.0), []
     for h in (4e-4, 2e-4, 1e-4):
-        exact = solve_ivp(lambda t, z: (*slope(*z[:2])[:2], *z[:2]), (0, h), [*start, 0, 0],
+        exact = solve_ivp(lambda t, z: (*flow.point(*z[:2])[:2], *z[:2]), (0, h), [*start, 0, 0],
                           'DOP853', rtol=1e-13, atol=1e-17).y[2:, -1]
-        errors.append(np.abs(step.step(start, SLIPPING_TORQUE, 1, h)[1] - exact))
+        _, integral, _, _, parts = clutch.step(flow.k, flow.u, start, h, tolerance=1.0)
+        assert len(parts) == 1
+        errors.append(np.abs(integral - exact))
     assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.5).all()   # 4 without h c/4
 
 
@@ -181,15 +167,13 @@ def test_integral_over_one_part_errs_with_the_fifth_power_of_its_length():
 @pytest.mark.parametrize('slip', [2000.0, -2000.0])
 def test_step_of_a_fully_slipping_clutch_is_exact(slip, direction, h):
     torque, y = (300.0, -120.0, -180.0), np.array([50.0, slip])
-    step = clutch_step()
-    slope, jacobian = step.flow(torque, direction)
-    here = slope(*y)
-    A = np.reshape(jacobian(here), (2, 2))
+    flow = Flow(SelfLockingParameters(), torque, direction)
+    A = np.reshape(flow.jacobian(*y)[:4], (2, 2))
     z = np.zeros((5, 5))   # (integral, y, 1)
-    z[:2, 2:4], z[2:4, 2:4], z[2:4, 4] = np.eye(2), A, here[:2] - A @ y
+    z[:2, 2:4], z[2:4, 2:4], z[2:4, 4] = np.eye(2), A, flow.point(*y)[:2] - A @ y
     exact = expm(z * h) @ [0, 0, *y, 1]
     assert exact[3] * slip > 0 and abs(exact[3]) > 20   # slips fully up to the end
-    got, integral, _, coarse = step.step(tuple(y), torque, direction, h)
+    got, integral, _, coarse, _ = clutch.step(flow.k, flow.u, tuple(y), h)
     assert relative_difference(got, exact[2:4]) < 1e-12
     assert relative_difference(integral, exact[:2]) < 1e-12
     assert not coarse
@@ -199,72 +183,73 @@ def test_step_of_a_fully_slipping_clutch_is_exact(slip, direction, h):
 @pytest.mark.parametrize('direction', BOTH)
 def test_backward_euler_solves_its_equation_and_nears_rest_of_slip_whatever_the_step(
         torque, direction):
-    slope, jacobian = clutch_step().flow(torque, direction)
+    flow = Flow(SelfLockingParameters(), torque, direction)
 
     def rest_of_slip(w):
-        return brentq(lambda s: slope(w, s)[1], -50, 50, xtol=1e-14)
+        return brentq(lambda s: flow.point(w, s)[1], -50, 50, xtol=1e-14)
 
     for distance in (-5.0, -0.1, 1e-3, 0.1, 5.0):
         for h in 10.0 ** np.arange(-4.0, 2):
             start = rest_of_slip(10.0) + distance
-            here = slope(10.0, start)
-            w, slip = backward_euler(slope, 10.0, start, here, jacobian(here), h)
+            J = flow.jacobian(10.0, start)
+            w, slip = backward_euler(flow.k, flow.u, 10.0, start, J, h)
             rest = rest_of_slip(w)
             assert abs(slip - rest) < abs(start - rest)
             # brentq stops at 1e-12 rad/s, where the slope is steep
-            assert slip - start == pytest.approx(h * slope(w, slip)[1], rel=1e-6, abs=1e-6 * h)
+            assert slip - start == pytest.approx(
+                h * flow.point(w, slip)[1], rel=1e-6, abs=1e-6 * h)
 
 
 def test_backward_euler_reaches_the_steady_state_in_one_long_step():
     torque = (30.0, -10.0, -19.0)
-    slope, jacobian = clutch_step().flow(torque, 1)
+    flow = Flow(SelfLockingParameters(), torque, 1)
     w, slip = 150.0, 0.0
     for _ in range(30):
-        here = slope(w, slip)
-        w, slip = backward_euler(slope, w, slip, here, jacobian(here), 1e6)
-    assert slope(w, slip)[:2] == pytest.approx((0, 0), abs=1e-3)
+        w, slip = backward_euler(flow.k, flow.u, w, slip, flow.jacobian(w, slip), 1e6)
+    assert flow.point(w, slip)[:2] == pytest.approx((0, 0), abs=1e-3)
 
 
 def test_backward_euler_is_of_first_order():
-    slope, jacobian = clutch_step(SLIPPING).flow(SLIPPING_TORQUE, 1)
+    flow = Flow(SLIPPING, SLIPPING_TORQUE, 1)
     start, end = (40.0, 4.0), 0.02
-    exact = solve_ivp(lambda t, y: slope(*y)[:2], (0, end), start, 'DOP853',
+    exact = solve_ivp(lambda t, y: flow.point(*y)[:2], (0, end), start, 'DOP853',
                       rtol=1e-12, atol=1e-12).y[:, -1]
     errors = []
     for parts in (40, 80, 160):
         y = start
         for _ in range(parts):
-            here = slope(*y)
-            y = backward_euler(slope, *y, here, jacobian(here), end / parts)
+            y = backward_euler(flow.k, flow.u, *y, flow.jacobian(*y), end / parts)
         errors.append(np.abs(y - exact).max())
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert ((orders > 0.8) & (orders < 1.2)).all()
 
 
 def test_step_beyond_its_bound_of_work_is_coarse_stable_and_says_so(monkeypatch):
-    monkeypatch.setattr(ClutchStep, 'MOST_PARTS', 2)
-    step, torque = clutch_step(), (3000.0, -1000.0, -1900.0)
-    (w, slip), _, _, coarse = step.step((10.0, -30.0), torque, 1, 0.05)
+    flow = Flow(SelfLockingParameters(), (3000.0, -1000.0, -1900.0), 1)
+    monkeypatch.setattr(clutch, 'MOST_PARTS', 2)
+    (w, slip), _, _, coarse, _ = clutch.step(flow.k, flow.u, (10.0, -30.0), 0.05)
     monkeypatch.undo()
-    (w_fine, slip_fine), _, _, fine = step.step((10.0, -30.0), torque, 1, 0.05)
+    (w_fine, slip_fine), _, _, fine, _ = clutch.step(flow.k, flow.u, (10.0, -30.0), 0.05)
     assert (coarse, fine) == (True, False)
     assert abs(slip - slip_fine) < 30 and abs(w - w_fine) < 0.2 * abs(w_fine - 10)
 
 
-def test_parts_meet_the_end_of_the_step(monkeypatch):
-    taken, plain = [], steppers.rosenbrock_part
-
-    def recorded(slope, w, s, here, J, h):
-        result = plain(slope, w, s, here, J, h)
-        taken.append((h, result))
-        return result
-
-    monkeypatch.setattr(steppers, 'rosenbrock_part', recorded)
-    clutch_step().step((10.0, 3.0), (400.0, -250.0, -100.0), 1, 5e-3)
-    accepted = [h for h, ((dw, ds), _, (cw, cs)) in taken
-                if abs(cw) + abs(cs) <= ClutchStep.TOLERANCE + 1e-6 * (abs(dw) + abs(ds))]
-    assert 1 < len(accepted) < len(taken)
-    assert sum(accepted) == pytest.approx(5e-3, rel=1e-14)
+def test_parts_lead_from_the_start_to_the_end_of_the_step():
+    flow, start = Flow(SelfLockingParameters(), (400.0, -250.0, -100.0), 1), (10.0, 3.0)
+    end, integral, point, _, parts = clutch.step(flow.k, flow.u, start, 5e-3)
+    assert len(parts) > 1
+    at, whole, turned = np.array(start), 0.0, 0.0
+    for y, f, J, h, d, c, angle, straight, here, there in parts:
+        assert not straight and at == pytest.approx(y, rel=1e-14)
+        assert f == here[:2] and here == pytest.approx(flow.point(*y), rel=1e-12)
+        assert J == pytest.approx(flow.jacobian(*y), rel=1e-12)
+        assert abs(c[0]) + abs(c[1]) <= clutch.TOLERANCE + clutch.RELATIVE * np.abs(d).sum()
+        at = at + d + c
+        assert there == pytest.approx(flow.point(*at), rel=1e-9, abs=1e-9)
+        whole, turned = whole + h, turned + np.array(angle)
+    assert whole == pytest.approx(5e-3, rel=1e-14)
+    assert at == pytest.approx(end, rel=1e-14) and turned == pytest.approx(integral, rel=1e-14)
+    assert there == point
 
 
 def test_error_estimate_sees_a_slip_that_reverses_within_one_part():
@@ -272,14 +257,13 @@ def test_error_estimate_sees_a_slip_that_reverses_within_one_part():
     # while the slip crosses the whole of tanh
     p = SelfLockingParameters(c_f1=50.0, c_f2=50.0)
     y, torque = (-20.95807993, 0.04110333), (-178.7980973, -51.90204872, 6.36334593)
-    friction = (0.0, 0.0), tuple(
-        a * M + b for a, M, b in zip(self_locking.full_friction(p)[0], (17.81272556, 26.71951208),
-                                     self_locking.full_friction(p)[1], strict=True))
-    step = clutch_step(p)
-    slope, _ = step.flow(torque, 1, friction)
-    exact = solve_ivp(lambda t, y: slope(*y)[:2], (0, 1e-3), y, 'Radau',
+    friction = tuple(
+        a * M + b for a, M, b in zip(clutched.full_friction(p)[0], (17.81272556, 26.71951208),
+                                     clutched.full_friction(p)[1], strict=True))
+    flow = Flow(p, torque, 1, friction)
+    exact = solve_ivp(lambda t, y: flow.point(*y)[:2], (0, 1e-3), y, 'Radau',
                       rtol=1e-11, atol=1e-11).y[:, -1]
-    got, _, _, coarse = step.step(y, torque, 1, 1e-3, friction)
+    got, _, _, coarse, _ = clutch.step(flow.k, flow.u, y, 1e-3)
     assert not coarse
     assert np.abs(got - exact).max() < 1e-3
 
@@ -292,16 +276,13 @@ class Reference:
 
     def __init__(self, variant, p, h):
         self.p, self.h, self.lagged = p, h, variant == 'lsd_lagged'
-        self.clutch, self.direction, self.y = clutch_step(p), 1, np.zeros(2)
-        self.M = (0.0, 0.0)
+        self.direction, self.y, self.M = 1, np.zeros(2), (0.0, 0.0)
 
     def friction(self):
-        """Return the friction at full slip; that of the lagged variant knows only the last M."""
-        phi, preload = self_locking.full_friction(self.p)
-        if not self.lagged:
-            return phi, preload
-        return (0.0, 0.0), tuple(a * abs(m) + b for a, m, b in
-                                 zip(phi, self.M, preload, strict=True))
+        """Return the friction of the lagged variant, which knows only the last M; else None."""
+        phi, preload = clutched.full_friction(self.p)
+        if self.lagged:
+            return tuple(a * abs(m) + b for a, m, b in zip(phi, self.M, preload, strict=True))
 
     def step(self, T):
         """Return the speeds of carrier, front and rear, and their integrals over the tick."""
@@ -309,19 +290,19 @@ class Reference:
         power_in, power_out = abs(T[0] * w_0), abs(T[1] * w_1 + T[2] * w_2)
         if power_in or power_out:
             self.direction = 1 if power_in > power_out else -1
-        slope, jacobian = self.clutch.flow(T, self.direction, self.friction())
+        flow = Flow(self.p, T, self.direction, self.friction())
 
         def f(t, z):
-            return (*slope(z[0], z[1])[:2], z[0], z[1])
+            return (*flow.point(z[0], z[1])[:2], z[0], z[1])
 
         def J(t, z):
-            a, b, c, d = jacobian(slope(z[0], z[1]))
+            a, b, c, d, *_ = flow.jacobian(z[0], z[1])
             return [[a, b, 0, 0], [c, d, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]]
 
         z = odeint(f, [*self.y, 0, 0], [0, self.h], Dfun=J, tfirst=True, rtol=1e-10, atol=1e-10,
                    mxstep=5000)[-1]
         self.y = z[:2]
-        self.M = slope(*self.y)[4:6]
+        self.M = flow.point(*self.y)[4:6]
         return self.speeds(self.y), self.speeds(z[2:])
 
     def speeds(self, y):

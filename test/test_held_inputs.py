@@ -5,13 +5,14 @@
 
 import pytest
 
-from dm_ros.motion.held_inputs import TorqueInputs
+from dm_ros.mechanism.ports import torque
+from dm_ros.motion.held_inputs import HeldInputs
 
 SHAFTS = ('pinion', 'left', 'right')
 
 
 def inputs(limit=1e5, timeout=100):
-    return TorqueInputs(SHAFTS, limit, timeout)
+    return HeldInputs([torque(shaft) for shaft in SHAFTS], limit, timeout)
 
 
 def test_a_subset_leaves_the_other_shafts_alone():
@@ -27,7 +28,7 @@ def test_a_subset_leaves_the_other_shafts_alone():
     (('left', 'wheel'), (5.0, 5.0), 'wheel'),
     (('left', 'left'), (5.0, 5.0), 'left'),
     (('left', 'right'), (5.0,), '2 names'),
-    (('left',), (5.0, 5.0), '2 torques'),
+    (('left',), (5.0, 5.0), '2 values'),
 ])
 def test_a_bad_demand_is_refused_whole_and_says_why(names, values, word):
     torques = inputs()

@@ -7,13 +7,19 @@ import numpy as np
 import pytest
 
 from dm_ros import Simulation, VARIANTS
-from dm_ros.mechanism.loads import profile, PROFILES
+from dm_ros.mechanism.variants import (
+    MECHANISMS,
+    SELF_LOCKING,
+    SYMMETRIC,
+    variant_named,
+    variants_of,
+)
 
 
 def run(variant, seconds, rate=200):
     """Return speeds by shaft and power-flow indices over a run of the built-in load."""
     simulation = Simulation(variant, 1 / rate)
-    load = profile(variant)
+    load = variant_named(variant).mechanism.load
     snapshots = [simulation.step(load(n / rate)) for n in range(seconds * rate)]
     speeds = np.array([snapshot.velocity for snapshot in snapshots]).T
     return (dict(zip(simulation.shafts, speeds, strict=True)),
@@ -38,7 +44,7 @@ def test_power_flows_in_both_directions_for_a_fair_share(variant, seconds):
     assert 0.1 < (flow > 0).mean() < 0.9
 
 
-@pytest.mark.parametrize('variant', [name for name in VARIANTS if name.startswith('lsd')])
+@pytest.mark.parametrize('variant', variants_of(SELF_LOCKING))
 def test_the_self_locking_one_is_locked_at_times_and_slips_at_others(variant):
     speeds, _ = run(variant, 10)
     locked = np.abs(speeds['front'] - speeds['rear']) < 0.5
@@ -46,7 +52,7 @@ def test_the_self_locking_one_is_locked_at_times_and_slips_at_others(variant):
 
 
 def test_the_symmetric_load_is_in_phase_with_the_left_a_little_larger():
-    pinion, left, right = np.array([profile('symmetric_ode')(n / 100) for n in range(2000)]).T
+    pinion, left, right = np.array([SYMMETRIC.load(n / 100) for n in range(2000)]).T
     assert (left * right >= 0.0).all() and (np.abs(left) >= np.abs(right)).all()
     carrier = 3.517 * pinion
     assert np.corrcoef(carrier, left + right)[0, 1] < -0.95   # opposite, but
@@ -54,10 +60,10 @@ def test_the_symmetric_load_is_in_phase_with_the_left_a_little_larger():
 
 
 def test_the_self_locking_loads_are_a_few_hundred_newton_metres_and_change_sign():
-    for torque in np.array([profile('lsd_ode')(n / 100) for n in range(2000)]).T:
+    for torque in np.array([SELF_LOCKING.load(n / 100) for n in range(2000)]).T:
         assert 100.0 < torque.max() < 500.0 and -500.0 < torque.min() < -100.0
 
 
 def test_profiles_are_pure_functions_of_time():
-    for load in PROFILES.values():
+    for load in [mechanism.load for mechanism in MECHANISMS.values()]:
         assert load(3.7) == load(3.7) and all(type(torque) is float for torque in load(3.7))

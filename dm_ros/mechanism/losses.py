@@ -1,0 +1,102 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What each element of a differential loses, under the paper's law: one formula an element.
+
+The losses are what (38)-(40), (52), (59) and (60) take from the moments, times the speed of the
+shaft, with the paper's symbols and its sign of M. All are linear in products of two of speed,
+moment and torque. Given the products at an instant the formulas return powers, W; given their
+integrals over a time, energies, J. A loss is negative where the moment at a mesh or a bearing
+does not have the sign that fits the direction of power flow.
+
+w is the speed of the carrier omega_0 and s the slip omega_1 - omega_2.
+"""
+
+from dataclasses import dataclass
+
+from dm_ros.mechanism.power_flow import DIRECT
+
+
+def lost_in_bearing(eta):
+    """Return the share of its load that a bearing of an efficiency loses."""
+    return 1 / eta - 1
+
+
+@dataclass(frozen=True, slots=True)
+class SymmetricLosses:
+    """The coefficients of ``symmetric``, for one direction of power flow."""
+
+    drag_w: float      # of carrier and pinion against the housing, per w^2
+    drag_s: float      # of side gears and satellites in the carrier, per s^2
+    pinion_w: float    # drag of the pinion at its speed, per w^2
+    carrier_w: float   # drag that reacts on the carrier, per w
+    carrier_s: float
+    mesh_F: float      # shares lost
+    mesh_1: float
+    mesh_2: float
+    bearing_3: float
+    bearing_0: float
+    direct: float      # 1 in direct flow, otherwise 0
+    reverse: float
+
+
+def symmetric_losses(p, direction):
+    """Return the ``SymmetricLosses`` of parameters."""
+    direct = float(direction == DIRECT)
+    return SymmetricLosses(
+        p.l_0 + p.l_3 * p.g_F**2, (p.l_1 + p.l_2 + p.n_s * p.l_s / p.g_2s**2) / 4,
+        p.l_3 * p.g_F**2, p.l_0, (p.l_1 - p.l_2) / 2, 1 - p.eta_FG, 1 - p.eta_1G, 1 - p.eta_2G,
+        lost_in_bearing(p.eta_3B), lost_in_bearing(p.eta_0B), direct, 1.0 - direct)
+
+
+def symmetric(k, ww, ws, ss, M_F_w, M_1_w1, M_2_w2, M_1_w, M_2_w, T_3_w3):
+    """
+    Return what drag, final drive, left and right mesh, pinion and carrier bearing lose.
+
+    ``M_1_w1`` is the product of M_1 and omega_1, and so on.
+    """
+    return (k.drag_w * ww + k.drag_s * ss,
+            k.mesh_F * M_F_w, k.mesh_1 * M_1_w1, k.mesh_2 * M_2_w2,
+            k.bearing_3 * (k.pinion_w * ww + k.direct * M_F_w - k.reverse * T_3_w3),
+            k.bearing_0 * (k.carrier_w * ww - k.carrier_s * ws
+                           + k.direct * (M_1_w + M_2_w) + k.reverse * M_F_w))
+
+
+@dataclass(frozen=True, slots=True)
+class SelfLockingLosses:
+    """The coefficients of ``self_locking``, for one direction of power flow."""
+
+    k_1: float         # omega_1 - omega_0 over the slip
+    k_2: float         # omega_0 - omega_2 over the slip
+    drag_w: float      # of the carrier against the housing, per w^2
+    drag_s: float      # of crown gears and satellites in the carrier, per s^2
+    carrier_s: float   # drag that reacts on the carrier, per s
+    mesh_1: float      # shares lost
+    mesh_2: float
+    bearing_0: float
+    direct: float      # 1 in direct flow, otherwise 0
+    reverse: float
+
+
+def self_locking_losses(p, direction):
+    """Return the ``SelfLockingLosses`` of parameters."""
+    direct = float(direction == DIRECT)
+    k_1, k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
+    return SelfLockingLosses(
+        k_1, k_2, p.l_0, p.l_1 * k_1**2 + p.l_2 * k_2**2 + p.n_s * p.l_s * (k_2 / p.g_2s)**2,
+        p.l_1 * k_1 - p.l_2 * k_2, 1 - p.eta_1G, 1 - p.eta_2G, lost_in_bearing(p.eta_0B), direct,
+        1.0 - direct)
+
+
+def self_locking(k, ww, ws, ss, F_1_w, F_1_s, F_2_w, F_2_s, M_1_w, M_1_s, M_2_w, M_2_s, T_0_w):
+    """
+    Return what drag, front and rear mesh, carrier bearing, front and rear clutch lose.
+
+    ``F_1_w`` is the product of F_1 and w, and so on.
+    """
+    return (k.drag_w * ww + k.drag_s * ss,
+            k.mesh_1 * (M_1_w + k.k_1 * M_1_s), k.mesh_2 * (M_2_w - k.k_2 * M_2_s),
+            k.bearing_0 * (k.drag_w * ww - k.carrier_s * ws - F_1_w - F_2_w
+                           + k.direct * (M_1_w + M_2_w) - k.reverse * T_0_w),
+            k.k_1 * F_1_s, -k.k_2 * F_2_s)

@@ -1,0 +1,38 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The inputs of a mechanism by name: what may come in, in which unit and range."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Port(NamedTuple):
+    """One input: a number that is held in a tick."""
+
+    name: str     # of the element on which it acts
+    kind: str     # what it is, such as ``torque``
+    unit: str
+    low: float    # what may come in; infinity itself never may
+    high: float
+
+    def refusal(self, value):
+        """Return why a value must not come in, in words, or None."""
+        if math.isfinite(value) and self.low <= value <= self.high:
+            return None
+        allowed = 'a finite number'
+        if (self.low, self.high) != (-math.inf, math.inf):
+            allowed += f' in [{self.low:g}, {self.high:g}]'
+        return f'the {self.kind} on {self.name} is {value}, it must be {allowed}'
+
+
+def torque(shaft):
+    """Return the port of an external torque on a shaft."""
+    return Port(shaft, 'torque', 'N m', -math.inf, math.inf)
+
+
+def acting_on(elements, ports):
+    """Return the matrix (elements, ports) that puts each input on the element of its name."""
+    return np.array([[float(port.name == element) for port in ports] for element in elements])

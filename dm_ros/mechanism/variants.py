@@ -1,0 +1,83 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The one registry: which mechanisms there are, and which variants of each."""
+
+from typing import Callable, NamedTuple
+
+from dm_ros.mechanism import loads, self_locking, symmetric
+from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+
+
+class Mechanism(NamedTuple):
+    """What everybody knows of a mechanism, whatever its formulation."""
+
+    name: str           # before the names of its parameters
+    title: str
+    source: str         # of the default parameters, in the paper
+    variant: str        # the one to take if nothing speaks for another
+    parameters: type    # the table of its parameters
+    ports: tuple        # of ``Port``, its inputs; the driving shaft comes first
+    shafts: tuple       # names of all shafts: the carrier, the two outputs, others
+    outputs: tuple      # names of the two output shafts
+    gears: tuple        # names of the gear meshes, each with an internal moment
+    bearings: tuple     # names of the bearings that lose
+    clutches: tuple     # names of the clutches, each with an internal moment
+    load: Callable      # reference load: time in s -> torques on the ports, N m
+
+    @property
+    def inputs(self):
+        """Names of the shafts with a port."""
+        return tuple(port.name for port in self.ports)
+
+    @property
+    def moments(self):
+        """Names of the internal moments."""
+        return self.gears + self.clutches
+
+
+class Variant(NamedTuple):
+    """One formulation of a mechanism."""
+
+    name: str
+    mechanism: Mechanism
+    formulation: type   # makes the responses of a set of parameters
+    section: str        # of the paper
+    unknowns: str       # what its equations are solved for, as many as their matrix has rows
+
+
+SYMMETRIC = Mechanism(
+    name='symmetric', title='symmetric differential', source='Table 1', variant='symmetric_ode',
+    parameters=SymmetricParameters, ports=symmetric.PORTS, shafts=symmetric.SHAFTS,
+    outputs=symmetric.OUTPUTS, gears=symmetric.GEARS, bearings=symmetric.BEARINGS, clutches=(),
+    load=loads.symmetric)
+SELF_LOCKING = Mechanism(
+    name='lsd', title='self-locking differential', source='Table 2', variant='lsd_ode',
+    parameters=SelfLockingParameters, ports=self_locking.PORTS, shafts=self_locking.SHAFTS,
+    outputs=self_locking.OUTPUTS, gears=self_locking.GEARS, bearings=self_locking.BEARINGS,
+    clutches=self_locking.CLUTCHES, load=loads.self_locking)
+MECHANISMS = {mechanism.name: mechanism for mechanism in (SYMMETRIC, SELF_LOCKING)}
+
+CATALOGUE = {variant.name: variant for variant in (
+    Variant('symmetric_ode', SYMMETRIC, symmetric.SymmetricOde, '3.3, variant 1', 'ε₁ ε₂'),
+    Variant('symmetric_dae', SYMMETRIC, symmetric.SymmetricDae, '3.4, variant 2',
+            'ε₀ ε₁ ε₂ ε₃ εₛ M_F M₁ M₂'),
+    Variant('lsd_lagged', SELF_LOCKING, self_locking.SelfLockingLagged, '4.5, variant 1', 'ε₁ ε₂'),
+    Variant('lsd_ode', SELF_LOCKING, self_locking.SelfLockingOde, '4.6, variant 2',
+            'ε₁ ε₂ M₁ M₂'),
+    Variant('lsd_dae', SELF_LOCKING, self_locking.SelfLockingDae, '4.7, variant 3',
+            'ε₀ ε₁ ε₂ εₛ M₁ M₂'),
+)}
+VARIANTS = tuple(CATALOGUE)
+
+
+def variant_named(name):
+    """Return the ``Variant`` of a name; raise ValueError for one that there is not."""
+    if name not in CATALOGUE:
+        raise ValueError(f'variant: {name!r} is not one of {", ".join(VARIANTS)}')
+    return CATALOGUE[name]
+
+
+def variants_of(mechanism):
+    """Return the names of the variants of a ``Mechanism``, in the order of the paper."""
+    return tuple(v.name for v in CATALOGUE.values() if v.mechanism is mechanism)

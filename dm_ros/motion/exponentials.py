@@ -1,0 +1,84 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Exponentials of small matrices, in which linear equations are exact."""
+
+import cmath
+import math
+
+import numpy as np
+from scipy.linalg import expm
+
+
+def held_propagator(A, B, h):
+    """
+    Return the exact step of x' = A x + B u and of its integral under a constant u.
+
+    :param A: (n, n); B: (n, m); h: the step, s.
+    :return: ``Phi, Gamma, Psi, Theta`` with x(h) = Phi x + Gamma u and
+        integral of x over the step = Psi x + Theta u.
+    """
+    n, m = B.shape
+    # z = (integral of x, x, u): one matrix exponential holds all four blocks (Van Loan 1978)
+    generator = np.zeros((2 * n + m, 2 * n + m))
+    generator[:n, n:2 * n] = np.eye(n)
+    generator[n:2 * n, n:2 * n] = A
+    generator[n:2 * n, 2 * n:] = B
+    E = expm(generator * h)
+    return E[n:2 * n, n:2 * n], E[n:2 * n, 2 * n:], E[:n, n:2 * n], E[:n, 2 * n:]
+
+
+def phi_2(z):
+    """Return (e^z - 1 - z)/z^2 of a real or complex number."""
+    if abs(z) < 0.02:
+        return 1 / 2 + z * (1 / 6 + z * (1 / 24 + z * (1 / 120 + z * (1 / 720 + z / 5040))))
+    if isinstance(z, complex):
+        return (cmath.exp(z) - 1 - z) / (z * z)
+    return (math.expm1(min(z, 300.0)) - z) / (z * z)   # growth beyond e^300 is refused anyway
+
+
+def apply_phi_2(z11, z12, z21, z22, v1, v2):
+    """Return the vector phi_2(Z) v for a 2x2 matrix Z, by interpolation at its eigenvalues."""
+    mean, half = (z11 + z22) / 2, (z11 - z22) / 2
+    square = half * half + z12 * z21
+    root = math.sqrt(square) if square >= 0.0 else 1j * math.sqrt(-square)
+    high, low = mean + root, mean - root
+    value = phi_2(high)
+    if abs(root) > 1e-4:
+        slope = (value - phi_2(low)) / (2 * root)
+    else:   # the two meet: the derivative, to O(root^2), by a difference wide enough
+        slope = (phi_2(mean + 1e-3) - phi_2(mean - 1e-3)) / 2e-3
+    w1 = value * v1 + slope * ((z11 - high) * v1 + z12 * v2)
+    w2 = value * v2 + slope * (z21 * v1 + (z22 - high) * v2)
+    return (w1, w2) if square >= 0.0 else (w1.real, w2.real)
+
+
+def way(J, f, h, nodes):
+    """
+    Return the way q = t phi_1(t J) f of x' = J (x - x_0) + f at the times t = r h, pairs.
+
+    :param J: (J_11, J_12, J_21, J_22); nodes: ``(r, r^2, r^3, weight)`` of each.
+    """
+    J_11, J_12, J_21, J_22 = J
+    f_1, f_2 = f
+    mean, half = (J_11 + J_22) / 2, (J_11 - J_22) / 2
+    square = half * half + J_12 * J_21
+    path = []
+    if square > 1e-6 * mean * mean:   # two modes that are far from each other
+        root = math.sqrt(square)
+        high, low = mean + root, mean - root
+        b_1 = ((high - J_11) * f_1 - J_12 * f_2) / (2 * root)
+        b_2 = ((high - J_22) * f_2 - J_21 * f_1) / (2 * root)
+        a_1, a_2 = f_1 - b_1, f_2 - b_2
+        for r, _, _, _ in nodes:
+            t = h * r
+            slow = math.expm1(high * t) / high if high else t
+            fast = math.expm1(low * t) / low if low else t
+            path.append((a_1 * slow + b_1 * fast, a_2 * slow + b_2 * fast))
+    else:
+        for r, _, _, _ in nodes:
+            t = h * r
+            v_1, v_2 = apply_phi_2(t * J_11, t * J_12, t * J_21, t * J_22, f_1, f_2)
+            path.append((t * (f_1 + t * (J_11 * v_1 + J_12 * v_2)),
+                         t * (f_2 + t * (J_21 * v_1 + J_22 * v_2))))
+    return path
