@@ -1,10 +1,11 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the README says is what the code does: tables, versions, commands."""
+"""What the README and the pages of doc/ say is what the code does: tables, versions, commands."""
 
 from pathlib import Path
 import re
+import sys
 from xml.etree import ElementTree
 
 import pytest
@@ -16,6 +17,7 @@ from dm_ros.settings import NodeParameters
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / 'README.md').read_text()
+DOC = {path.stem: path.read_text() for path in (ROOT / 'doc').glob('*.md')}
 
 
 def parameter_table():
@@ -52,6 +54,37 @@ def test_all_shafts_and_moments_are_named():
         simulation = Simulation(variant)
         for name in (*simulation.shafts, *simulation.moments):
             assert f'`{name}`' in README
+
+
+@pytest.fixture
+def bench(monkeypatch):
+    """Return what imports a file of bench/."""
+    monkeypatch.syspath_prepend(ROOT / 'bench')
+    yield __import__
+    for path in (ROOT / 'bench').glob('*.py'):
+        sys.modules.pop(path.stem, None)
+
+
+def head(names):
+    """Return the head of a Markdown table as the benchmarks print it."""
+    return f'| {" | ".join(names)} |\n|---|' + '---:|' * (len(names) - 1)
+
+
+def test_the_tables_of_costs_and_errors_are_those_of_the_bench(bench):
+    page, step = DOC['performance'], bench('step')
+    for names in (step.COSTS, step.TARGETS, step.REFERENCE_LOAD, step.HARD_LOAD):
+        assert head(names) in page
+    costs = page.split(head(step.COSTS))[1].split('\n\n')[0].strip().splitlines()
+    assert [line.split(' | ')[0].removeprefix('| ') for line in costs] == [
+        row.name for row in step.all_rows()]
+    assert step.LEGEND.format(passes=15, ticks=10_000, tolerance=step.SolveIvp.RTOL,
+                              slow=step.SLOW_PASSES) in page
+
+
+def test_the_table_of_the_loop_is_that_of_the_bench(bench):
+    loop = bench('loop')
+    assert head(loop.HEAD) in DOC['performance']
+    assert loop.LEGEND in DOC['performance']
 
 
 def test_the_changelog_begins_with_the_version_of_the_package():
