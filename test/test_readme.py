@@ -20,6 +20,10 @@ README = (ROOT / 'README.md').read_text()
 DOC = {path.stem: path.read_text() for path in (ROOT / 'doc').glob('*.md')}
 
 
+def test_the_readme_is_short():
+    assert len(README.encode()) <= 8192
+
+
 def parameter_table():
     """Return the lines of the table of parameters."""
     lines = ['| name | default | unit | allowed | |', '|---|---|---|---|---|']
@@ -49,11 +53,24 @@ def test_the_table_of_variants_is_that_of_the_code():
         assert f'| {inputs} |' in line
 
 
-def test_all_shafts_and_moments_are_named():
+def test_all_shafts_and_moments_are_named_in_their_order():
     for variant in VARIANTS:
         simulation = Simulation(variant)
-        for name in (*simulation.shafts, *simulation.moments):
-            assert f'`{name}`' in README
+        cells = [', '.join(f'`{name}`' for name in names)
+                 for names in (simulation.inputs, simulation.shafts, simulation.moments)]
+        assert f'| {" | ".join(cells)} |' in DOC['interface']
+
+
+def test_the_topics_and_services_are_those_that_the_policy_grants():
+    # which are those of the node: test_security_policy.py
+    policy = ElementTree.parse(ROOT / 'config' / 'sros2_policy.xml').getroot()
+    granted = [element.text for element in policy.iter() if element.tag in ('topic', 'service')
+               and element.text.startswith('~/')
+               and not re.search('parameter|type_description', element.text)]   # of every node
+    told = re.findall(r'^\| (?:in|out|srv) \| `(~/[^`]+)` \|', README, re.MULTILINE)
+    one_for_all = [{re.sub('^(~/[a-z_]+)/.*', r'\1/<name>', name) for name in names}
+                   for names in (granted, told)]
+    assert one_for_all[0] == one_for_all[1]
 
 
 @pytest.fixture
@@ -105,12 +122,12 @@ def test_every_file_that_is_linked_is_there(page):
 
 
 def test_the_readme_links_to_every_page():
-    for page in (ROOT / 'doc').glob('*.md'):
-        assert f'](doc/{page.name})' in README, page.name
+    for name in DOC:
+        assert f'](doc/{name}.md)' in README, name
 
 
 def test_every_test_that_the_physics_page_names_is_there():
-    names = re.findall(r'`(test_\w+)`', (ROOT / 'doc' / 'physics.md').read_text())
+    names = re.findall(r'`(test_\w+)`', DOC['physics'])
     tests = ''.join(path.read_text() for path in (ROOT / 'test').glob('test_*.py'))
     assert len(names) > 5
     for name in names:
