@@ -3,6 +3,7 @@
 
 """What the README and the pages of doc/ say is what the code does: tables, versions, commands."""
 
+from fnmatch import fnmatch
 from pathlib import Path
 import re
 import sys
@@ -119,11 +120,17 @@ def test_every_file_that_is_linked_is_there(page):
     text = re.sub(r'^    .*$', '', page.read_text(), flags=re.MULTILINE)   # no code
     for link in re.findall(r'\]\(([^)#:]+)\)', text):
         assert (page.parent / link).exists(), link
+        assert page.parent.name != 'doc' or '/' not in link, f'{link}: no page of rosdoc2'
 
 
 def test_the_readme_links_to_every_page():
     for name in DOC:
         assert f'](doc/{name}.md)' in README, name
+
+
+def test_the_index_of_the_pages_has_every_page():
+    index = (ROOT / 'doc' / 'index.rst').read_text()
+    assert sorted(re.findall(r'^   /doc/(.*)$', index, re.MULTILINE)) == sorted(DOC)
 
 
 def test_every_test_that_the_physics_page_names_is_there():
@@ -138,6 +145,18 @@ def test_every_make_target_that_is_named_is_there():
     targets = set(re.findall(r'^([a-z-]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
     for page in PAGES:
         assert set(re.findall(r'`make ([a-z][a-z-]*)', page.read_text())) <= targets, page
+
+
+def test_what_the_targets_make_is_cleaned_and_ignored():
+    makefile = (ROOT / 'Makefile').read_text().replace('\\\n', '')
+    cleaned = re.search(r'^clean:.*\n\trm -rf (.*)$', makefile, re.MULTILINE).group(1).split()
+    ignored = [line.strip('/') for line in (ROOT / '.gitignore').read_text().split()]
+    for name in cleaned:
+        assert any(fnmatch(name, pattern) for pattern in ignored), name
+    for pattern in set(ignored) - {'__pycache__'}:
+        assert any(fnmatch(name, pattern) for name in cleaned), pattern
+    removed = set(' '.join(re.findall(r'^\trm -rf ([^$\n]*)$', makefile, re.MULTILINE)).split())
+    assert removed <= set(cleaned)
 
 
 def test_every_dependency_of_setup_has_its_rosdep_key():
