@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test test-long lint bench bench-loop soak compare colcon test-jazzy-versions clean
+.PHONY: help setup run test test-long lint bench bench-loop soak compare docs colcon test-jazzy-versions clean
 
 PYTHON = python3
 VARIANT = symmetric_ode
@@ -21,9 +21,10 @@ PACKAGING := Makefile package.xml setup.cfg setup.py
 # pip writes console scripts to bin/ whatever setup.cfg says, if it builds by PEP 517.
 PIP_INSTALL := bin/pip install --quiet --use-pep517
 
-# What .venv-lint, .venv-bench and .venv-jazzy hold, and what colcon adds to .venv.
+# What .venv-lint, .venv-bench, .venv-docs and .venv-jazzy hold, and what colcon adds to .venv.
 lint := ruff==0.17.6
 bench := --editable . mujoco==4.0.0 control==0.10.2
+docs := rosdoc2==0.2.1
 colcon := colcon-common-extensions ros-jazzy-ament-package 'setuptools<80' wheel
 jazzy := --editable '.[test,physics]' numpy==1.26.4 scipy==1.11.4
 
@@ -80,6 +81,13 @@ soak: setup  ## run the node for an hour, or DURATION s, and look at memory and 
 lint: .venv-lint/done  ## check the style
 	.venv-lint/bin/ruff check
 
+docs: .venv-docs/done  ## make web pages of doc/ and of the library in docs_output/, by rosdoc2
+	rm -rf docs_build docs_output cross_reference
+	mkdir docs_build
+	env -u PYTHONPATH PATH="$(CURDIR)/.venv-docs/bin:$$PATH" rosdoc2 build --package-path . \
+	  >docs_build/log 2>&1 || { cat docs_build/log; false; }
+	! grep -E '(WARNING|ERROR|CRITICAL):' docs_build/log
+
 .venv/colcon: .venv/$(ROS)
 	test $(ROS) = ros || .venv/$(PIP_INSTALL) $(colcon)
 	touch $@
@@ -96,4 +104,5 @@ test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's n
 	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest -n auto --ignore=test/ros $(PYTEST_ARGS)
 
 clean:  ## remove all that the other targets make
-	rm -rf .venv .venv-* build install log run comparison *.egg-info .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .venv-* build install log run comparison docs_build docs_output cross_reference \
+	  *.egg-info .hypothesis .pytest_cache .ruff_cache

@@ -63,6 +63,8 @@ tick; `alone` those in a second in which the C loop, which ran at the same time,
 in the second before or after. `CPU` is that of the process, of one core. `round trip` is from the
 publishing of a torque in another process to the arrival there of the joint state that carries it.
 """
+HEAD = ['loop', 'rate held, Hz', 'lateness p50, us', 'p99, us', 'max, us', 'missed', 'alone',
+        'ticks made', 'CPU', 'round trip p50, ms', 'p99, ms']
 
 
 class Timeline:
@@ -313,9 +315,7 @@ def main():
     print(f'{date.today()}, {platform.machine()}, {os.cpu_count()} cores, {platform.system()}, '
           f'Python {platform.python_version()}, {arguments.variant}, {arguments.duration:g} s for '
           f'each rate, load average {os.getloadavg()[0]:.1f} before\n\n{LEGEND}')
-    header = ['loop', 'rate held, Hz', 'lateness p50, us', 'p99, us', 'max, us', 'missed',
-              'alone', 'ticks made', 'CPU', 'round trip p50, ms', 'p99, ms']
-    print('| ' + ' | '.join(header) + ' |\n|---|' + '---:|' * (len(header) - 1))
+    print('| ' + ' | '.join(HEAD) + ' |\n|---|' + '---:|' * (len(HEAD) - 1))
     with own_domain() as domain, tempfile.TemporaryDirectory() as folder:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         c_loop = compiled(Path(folder))

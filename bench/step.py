@@ -30,6 +30,15 @@ DT = 1e-3            # s, of the cost table
 SLOW_PASSES = 3      # of the rows with solve_ivp
 RIGHT = 1e-3         # rad/s: a peer with a larger error is fast but wrong
 NOTHING = '-'
+# the heads of the tables, as doc/performance.md has them
+COSTS = ['cost of a tick', 'mean, us', 'ratio', 'p99.9, us', 'worst tick, us', 'max, us',
+         'error, rad/s', 'slip error, rad/s']
+TARGETS = ['target', 'measured', 'holds']
+REFERENCE_LOAD = ['accuracy, 10,000 ticks of the reference load', 'rate', 'speeds, relative',
+                  'angles, relative', 'ticks of other index', 'within 1e-10']
+HARD_LOAD = ['accuracy, 2.5 s of hard load to 1,000 N m', 'rate', 'steepness, s/rad',
+             'speeds, rad/s', 'slip, rad/s', 'ticks of other index', 'coarse steps',
+             'within 1e-3 and 1e-2']
 LEGEND = """\
 All rows step the reference load of the scenarios at 1 kHz in one run, with torques made
 beforehand: {passes} passes over {ticks} ticks, each through all rows in turn (solve_ivp: {slow}
@@ -236,8 +245,7 @@ def print_costs(rows, costs):
             *(NOTHING if t is None else microseconds(t)
               for t in (cost.percentile, cost.worst, cost.most)),
             *(error_text(e) for e in cost.error)])
-    table(['cost of a tick', 'mean, us', 'ratio', 'p99.9, us', 'worst tick, us', 'max, us',
-           'error, rad/s', 'slip error, rad/s'], lines)
+    table(COSTS, lines)
 
 
 def print_targets(costs):
@@ -281,7 +289,7 @@ def print_targets(costs):
         for dae, ode in (('symmetric_dae', 'symmetric_ode'), ('lsd_dae', 'lsd_ode')):
             ratio = costs[f'{dae}, {kind}'].mean / costs[f'{ode}, {kind}'].mean
             target(f'{dae}, {kind} <= twice {ode}', f'{ratio:.2f} times', ratio <= 2)
-    table(['target', 'measured', 'holds'], lines)
+    table(TARGETS, lines)
 
 
 def hard_load(rate):
@@ -343,11 +351,8 @@ def print_accuracy(bar):
                             'yes' if speed <= 1e-3 and slip <= 1e-2 else 'no'])
             bar.update()
     bar.close()
-    table(['accuracy, 10,000 ticks of the reference load', 'rate', 'speeds, relative',
-           'angles, relative', 'ticks of other index', 'within 1e-10'], symmetric)
-    table(['accuracy, 2.5 s of hard load to 1,000 N m', 'rate', 'steepness, s/rad',
-           'speeds, rad/s', 'slip, rad/s', 'ticks of other index', 'coarse steps',
-           'within 1e-3 and 1e-2'], lsd)
+    table(REFERENCE_LOAD, symmetric)
+    table(HARD_LOAD, lsd)
 
 
 def machine():

@@ -16,6 +16,10 @@ HOMES = {
 __all__ = sorted(HOMES)
 
 
+def __dir__():
+    return sorted({*globals(), *__all__})
+
+
 def __getattr__(name):
     if name not in HOMES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

@@ -43,7 +43,7 @@ def test_the_lock_brings_torque_to_the_wheel_on_asphalt():
 def test_the_page_of_the_example_says_what_the_command_says():
     lines = brake_lock.report(
         [brake_lock.run(case, 5.0, direct=True) for case in brake_lock.CASES])
-    page = (ROOT / 'examples' / 'README.md').read_text()
+    page = (ROOT / 'doc' / 'example.md').read_text()
     for line in lines[2:5]:
         _, car, slip, _, tyre = line.split()
         assert f'| {car} | {slip} | {tyre} |' in page
@@ -143,6 +143,6 @@ def test_the_car_of_the_example_is_within_its_limit_and_chatters_beyond():
 
 
 def test_every_file_that_the_pages_link_is_there():
-    for page in ('doc/coupling.md', 'doc/lockstep.md', 'doc/testing.md', 'examples/README.md'):
+    for page in ('doc/coupling.md', 'doc/example.md', 'doc/lockstep.md', 'doc/testing.md'):
         for link in re.findall(r'\]\(([^)#:]+)\)', (ROOT / page).read_text()):
             assert (ROOT / page).parent.joinpath(link).exists(), f'{page}: {link}'

@@ -1,10 +1,12 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the README says is what the code does: tables, versions, commands."""
+"""What the README and the pages of doc/ say is what the code does: tables, versions, commands."""
 
+from fnmatch import fnmatch
 from pathlib import Path
 import re
+import sys
 from xml.etree import ElementTree
 
 import pytest
@@ -16,10 +18,15 @@ from dm_ros.settings import NodeParameters
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / 'README.md').read_text()
+DOC = {path.stem: path.read_text() for path in (ROOT / 'doc').glob('*.md')}
+
+
+def test_the_readme_is_short():
+    assert len(README.encode()) <= 8192
 
 
 def parameter_table():
-    """Return the lines of the README's table of parameters."""
+    """Return the lines of the table of parameters."""
     lines = ['| name | default | unit | allowed | |', '|---|---|---|---|---|']
     for table in (NodeParameters(), SymmetricParameters(), SelfLockingParameters()):
         for symbol, (name, entry) in table.rows().items():
@@ -36,7 +43,7 @@ def parameter_table():
 
 def test_the_table_of_parameters_is_that_of_the_code():
     lines = parameter_table()
-    assert '\n'.join(lines) in README, '\n'.join(lines)
+    assert '\n'.join(lines) in DOC['parameters'], '\n'.join(lines)
 
 
 def test_the_table_of_variants_is_that_of_the_code():
@@ -47,11 +54,55 @@ def test_the_table_of_variants_is_that_of_the_code():
         assert f'| {inputs} |' in line
 
 
-def test_all_shafts_and_moments_are_named():
+def test_all_shafts_and_moments_are_named_in_their_order():
     for variant in VARIANTS:
         simulation = Simulation(variant)
-        for name in (*simulation.shafts, *simulation.moments):
-            assert f'`{name}`' in README
+        cells = [', '.join(f'`{name}`' for name in names)
+                 for names in (simulation.inputs, simulation.shafts, simulation.moments)]
+        assert f'| {" | ".join(cells)} |' in DOC['interface']
+
+
+def test_the_topics_and_services_are_those_that_the_policy_grants():
+    # which are those of the node: test_security_policy.py
+    policy = ElementTree.parse(ROOT / 'config' / 'sros2_policy.xml').getroot()
+    granted = [element.text for element in policy.iter() if element.tag in ('topic', 'service')
+               and element.text.startswith('~/')
+               and not re.search('parameter|type_description', element.text)]   # of every node
+    told = re.findall(r'^\| (?:in|out|srv) \| `(~/[^`]+)` \|', README, re.MULTILINE)
+    one_for_all = [{re.sub('^(~/[a-z_]+)/.*', r'\1/<name>', name) for name in names}
+                   for names in (granted, told)]
+    assert one_for_all[0] == one_for_all[1]
+
+
+@pytest.fixture
+def bench(monkeypatch):
+    """Return what imports a file of bench/."""
+    monkeypatch.syspath_prepend(ROOT / 'bench')
+    yield __import__
+    for path in (ROOT / 'bench').glob('*.py'):
+        sys.modules.pop(path.stem, None)
+
+
+def head(names):
+    """Return the head of a Markdown table as the benchmarks print it."""
+    return f'| {" | ".join(names)} |\n|---|' + '---:|' * (len(names) - 1)
+
+
+def test_the_tables_of_costs_and_errors_are_those_of_the_bench(bench):
+    page, step = DOC['performance'], bench('step')
+    for names in (step.COSTS, step.TARGETS, step.REFERENCE_LOAD, step.HARD_LOAD):
+        assert head(names) in page
+    costs = page.split(head(step.COSTS))[1].split('\n\n')[0].strip().splitlines()
+    assert [line.split(' | ')[0].removeprefix('| ') for line in costs] == [
+        row.name for row in step.all_rows()]
+    assert step.LEGEND.format(passes=15, ticks=10_000, tolerance=step.SolveIvp.RTOL,
+                              slow=step.SLOW_PASSES) in page
+
+
+def test_the_table_of_the_loop_is_that_of_the_bench(bench):
+    loop = bench('loop')
+    assert head(loop.HEAD) in DOC['performance']
+    assert loop.LEGEND in DOC['performance']
 
 
 def test_the_changelog_begins_with_the_version_of_the_package():
@@ -69,15 +120,21 @@ def test_every_file_that_is_linked_is_there(page):
     text = re.sub(r'^    .*$', '', page.read_text(), flags=re.MULTILINE)   # no code
     for link in re.findall(r'\]\(([^)#:]+)\)', text):
         assert (page.parent / link).exists(), link
+        assert page.parent.name != 'doc' or '/' not in link, f'{link}: no page of rosdoc2'
 
 
 def test_the_readme_links_to_every_page():
-    for page in (ROOT / 'doc').glob('*.md'):
-        assert f'](doc/{page.name})' in README, page.name
+    for name in DOC:
+        assert f'](doc/{name}.md)' in README, name
+
+
+def test_the_index_of_the_pages_has_every_page():
+    index = (ROOT / 'doc' / 'index.rst').read_text()
+    assert sorted(re.findall(r'^   /doc/(.*)$', index, re.MULTILINE)) == sorted(DOC)
 
 
 def test_every_test_that_the_physics_page_names_is_there():
-    names = re.findall(r'`(test_\w+)`', (ROOT / 'doc' / 'physics.md').read_text())
+    names = re.findall(r'`(test_\w+)`', DOC['physics'])
     tests = ''.join(path.read_text() for path in (ROOT / 'test').glob('test_*.py'))
     assert len(names) > 5
     for name in names:
@@ -88,6 +145,18 @@ def test_every_make_target_that_is_named_is_there():
     targets = set(re.findall(r'^([a-z-]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
     for page in PAGES:
         assert set(re.findall(r'`make ([a-z][a-z-]*)', page.read_text())) <= targets, page
+
+
+def test_what_the_targets_make_is_cleaned_and_ignored():
+    makefile = (ROOT / 'Makefile').read_text().replace('\\\n', '')
+    cleaned = re.search(r'^clean:.*\n\trm -rf (.*)$', makefile, re.MULTILINE).group(1).split()
+    ignored = [line.strip('/') for line in (ROOT / '.gitignore').read_text().split()]
+    for name in cleaned:
+        assert any(fnmatch(name, pattern) for pattern in ignored), name
+    for pattern in set(ignored) - {'__pycache__'}:
+        assert any(fnmatch(name, pattern) for name in cleaned), pattern
+    removed = set(' '.join(re.findall(r'^\trm -rf ([^$\n]*)$', makefile, re.MULTILINE)).split())
+    assert removed <= set(cleaned)
 
 
 def test_every_dependency_of_setup_has_its_rosdep_key():

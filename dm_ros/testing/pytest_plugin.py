@@ -4,8 +4,10 @@
 """
 Fixtures for the tests of a controller, active in pytest as soon as dm_ros is installed.
 
-``differential``         makes a ``LockstepDifferential``: real topics, the test's own nodes
-``direct_differential``  makes a ``DirectDifferential``: a control law as a function, no topics
+- ``differential`` makes a ``LockstepDifferential``: real topics, the test's own nodes
+- ``direct_differential`` makes a ``DirectDifferential``: a control law as a function, no topics
+
+::
 
     def test_grip(differential):
         vehicle = differential(variant='lsd_ode', rate=500.0)

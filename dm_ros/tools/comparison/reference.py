@@ -77,7 +77,7 @@ def exact_self_locking(p, torques, dt, start=(0.0, 0.0), deadband=0.0, tick=lamb
     """
     Return the ``Exact`` motion of a self-locking differential by LSODA, begun anew in each tick.
 
-    :param frozen: None, or (|M_1|, |M_2|) at the start, N m: the friction then knows the gear
+    :param frozen: None, or ``(|M_1|, |M_2|)`` at the start, N m: the friction then knows the gear
         moments of the end of the preceding tick alone, as in variant 1.
     :raises ValueError: where LSODA gives up.
 
