@@ -20,12 +20,12 @@ class Port(NamedTuple):
 
     def refusal(self, value):
         """Return why a value must not come in, in words, or None."""
-        if math.isfinite(value) and self.low <= value <= self.high:
-            return None
-        allowed = 'a finite number'
-        if (self.low, self.high) != (-math.inf, math.inf):
-            allowed += f' in [{self.low:g}, {self.high:g}]'
-        return f'the {self.kind} on {self.name} is {value}, it must be {allowed}'
+        what = f'the {self.kind} on {self.name} is {value}'
+        if not math.isfinite(value):
+            return what
+        if not self.low <= value <= self.high:
+            return f'{what}, it must be in [{self.low:g}, {self.high:g}]'
+        return None
 
 
 def torque(shaft):

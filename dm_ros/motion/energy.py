@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 from dm_ros.motion.meters import meter_of
 from dm_ros.motion.simulation import Simulation
+from dm_ros.motion.state import Snapshot
 
 AT_REST = 1e-6    # of the stored energy: with less turned over, its rounding is all there is
 NO_LOSS = 1e-12   # of the energy turned over in a tick: less than that, given back, is rounding
@@ -143,17 +144,18 @@ class Returned(NamedTuple):
     energy: float
 
 
-class AuditedSnapshot(NamedTuple):
-    """A ``Snapshot`` with the books of its tick."""
+class AuditedSnapshot(Snapshot):
+    """A ``Snapshot`` with ``energy``, the books of its tick, and ``stored_energy``, both in J."""
 
-    time: float
-    velocity: tuple
-    position: tuple
-    torque: tuple
-    moment: tuple
-    power_flow: int
-    energy: Energy         # J
-    stored_energy: float   # J
+    @classmethod
+    def of(cls, reported, energy, stored_energy):
+        """Return the snapshot of what was reported, in the order of the fields."""
+        snapshot = tuple.__new__(cls, reported)
+        snapshot.energy, snapshot.stored_energy = energy, stored_energy
+        return snapshot
+
+    def _replace(self, **changes):
+        return self.of(super()._replace(**changes), self.energy, self.stored_energy)
 
 
 def rated_efficiency(parameters):
@@ -246,7 +248,7 @@ class AuditedSimulation(Simulation):
 
     def snapshot(self):
         """Return the ``AuditedSnapshot`` of the last tick, or of the start at zero torque."""
-        return AuditedSnapshot(*self._report(), Energy(self._tick, self._layout), self._stored)
+        return AuditedSnapshot.of(self._report(), Energy(self._tick, self._layout), self._stored)
 
     @property
     def stored_energy(self):

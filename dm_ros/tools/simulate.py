@@ -5,6 +5,7 @@
 
 import argparse
 from array import array
+from collections import deque
 from contextlib import ExitStack
 import os
 import sys
@@ -84,19 +85,20 @@ def run(arguments):
     except ValueError as error:
         raise ValueError(f'{arguments.torques}: {error}') from None
     with ExitStack() as stack:
-        rows, numbers = rows_of(simulation, torques), array('d')
+        file, rows, numbers = None, rows_of(simulation, torques), array('d')
         if arguments.plot:
             picture = stack.enter_context(replacing(arguments.plot, 'wb'))
             rows = kept(rows, numbers)
         if arguments.out:
             file = stack.enter_context(replacing(arguments.out, 'w'))
-        elif arguments.plot:
-            file = stack.enter_context(open(os.devnull, 'w'))
-        else:
+        elif not arguments.plot:
             # a file of its own: the interpreter stumbles at its end over a sys.stdout that failed
             file = stack.enter_context(open(1, 'w', closefd=False))
         try:
-            write_csv(file, column_names(simulation), rows)
+            if file:
+                write_csv(file, column_names(simulation), rows)
+            else:
+                deque(rows, 0)
         except ValueError as error:
             raise ValueError(f'{arguments.torques}: after {simulation.time:g} s: '
                              f'{error}') from None

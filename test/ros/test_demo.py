@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from dm_ros.files.output import column_names
+from dm_ros.files.columns import column_names
 from dm_ros.motion.simulation import Simulation
 
 

@@ -268,14 +268,15 @@ WRITERS = {   # what writes, and what it says when the disk is full, with the ex
 DEMO = """
 import sys, types
 import numpy
-from dm_ros import Simulation
+from dm_ros.files.columns import column_names
+from dm_ros.files.record import Record
+from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.tools import demo
-from dm_ros.files.output import column_names
 
 def run(rows):
-    names = column_names(Simulation('symmetric_ode'))
-    columns = {name: numpy.arange(rows) / 7 for name in names}
-    demo.record = lambda arguments: types.SimpleNamespace(columns=lambda _: columns)
+    names = column_names(SYMMETRIC)
+    record = Record(SYMMETRIC, numpy.tile(numpy.arange(rows) / 7, (len(names), 1)).T, 'full')
+    demo.run_processes = lambda arguments: types.SimpleNamespace(record=lambda *_: record, missed=0)
     sys.exit(demo.main(['--out', 'out']))
 """
 
