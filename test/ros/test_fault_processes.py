@@ -276,7 +276,8 @@ from dm_ros.tools import demo
 def run(rows):
     names = column_names(SYMMETRIC)
     record = Record(SYMMETRIC, numpy.tile(numpy.arange(rows) / 7, (len(names), 1)).T, 'full')
-    demo.run_processes = lambda arguments: types.SimpleNamespace(record=lambda *_: record, missed=0)
+    recorder = types.SimpleNamespace(record=lambda *_: record, missed=0)
+    demo.run_processes = lambda arguments: recorder
     sys.exit(demo.main(['--out', 'out']))
 """
 
