@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from dm_ros.mechanism.parameters import Parameters, row
 from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS
+from dm_ros.motion.models import LOSS_LAWS, PASSIVE
 from dm_ros.motion.simulation import Simulation
 
 
@@ -25,6 +26,9 @@ class NodeParameters(Parameters):
 
     variant: str = row('variant', 'symmetric_ode', '', 0, 0, 'the mechanism and its formulation',
                        kind=str, read_only=True, choices=VARIANTS)
+    loss_law: str = row('loss_law', PASSIVE, '', 0, 0,
+                        'passive: no gear or bearing gives energy back; paper: as it has them',
+                        kind=str, read_only=True, choices=LOSS_LAWS)
     mode: str = row('mode', 'realtime', '', 0, 0,
                     'what advances time: the clock, or each message on ~/torques by one tick',
                     kind=str, read_only=True, choices=('realtime', 'lockstep'))
@@ -69,16 +73,17 @@ def known_rows():
             for table in tables() for name, entry in table.rows().values()}
 
 
-def make_simulation(variant, values, dt=None):
+def make_simulation(variant, values, dt=None, kind=Simulation):
     """
-    Return the ``Simulation`` that a node with the given parameters would run.
+    Return the simulation that a node with the given parameters would run.
 
     :param values: ``{full name: value}``, as ``read_parameter_file`` returns them.
     :param dt: length of a tick, s; None for that of the parameter ``rate``.
+    :param kind: ``Simulation``, or ``AuditedSimulation`` for one with energy books.
     """
     node = NodeParameters().changed(NodeParameters.part_of(values))
     mechanism = variant_named(variant).mechanism
-    return Simulation(
+    return kind(
         variant, 1 / node.rate if dt is None else dt, mechanism.parameters.part_of(values),
-        substeps=node.substeps, power_flow_deadband=node.deadband,
+        loss_law=node.loss_law, substeps=node.substeps, power_flow_deadband=node.deadband,
         initial_velocity=node.initial_velocity(mechanism.outputs))

@@ -9,9 +9,11 @@ import math
 import numpy as np
 
 from dm_ros import SelfLockingParameters, SymmetricParameters
-from dm_ros.mechanism import clutched
+from dm_ros.mechanism import clutched, passive
 from dm_ros.mechanism.self_locking import SelfLockingOde
 from dm_ros.mechanism.variants import SYMMETRIC, variant_named
+from dm_ros.motion import adaptive
+from dm_ros.motion.adaptive import PAPER, PASSIVE
 
 BOTH = (1, -1)   # directions of power flow
 
@@ -24,6 +26,8 @@ def is_symmetric(variant):
 class Flow:
     """A self-locking differential in one direction under held torques, as ``clutched`` has it."""
 
+    law = PAPER
+
     def __init__(self, p, T, direction, friction=None, formulation=SelfLockingOde):
         """Take friction that does not follow M, or None for that of the preload beside it."""
         self.k = clutched.coefficients(p, formulation(p).response(direction), friction is None)
@@ -31,11 +35,36 @@ class Flow:
 
     def point(self, w, s):
         """Return (dw/dt, ds/dt, F_1, F_2, M_1, M_2, ...)."""
-        return clutched.evaluate(self.k, self.u, w, s)
+        return self.law.evaluate(self.k, self.u, w, s)
 
     def jacobian(self, w, s):
         """Return (J_ww, J_ws, J_sw, J_ss) and what friction grows with."""
-        return clutched.jacobian(self.k, self.u, self.point(w, s))
+        return self.law.jacobian(self.k, self.u, self.point(w, s))
+
+    def step(self, y, h, **options):
+        """Return the adaptive step from y over h."""
+        return adaptive.step(self.law, self.k, self.u, tuple(y), h, **options)
+
+    def last_resort(self, y, h):
+        """Return the speeds and their integral after the step of any length."""
+        return self.law.last_resort(self.law, self.k, self.u, tuple(y), self.jacobian(*y)[0], h)
+
+
+class PassiveFlow(Flow):
+    """A differential of either mechanism under the passive law and held torques."""
+
+    law = PASSIVE
+
+    def __init__(self, p, T, friction=None):
+        """Take friction that does not follow M, or None for that of the preload beside it."""
+        clutches = isinstance(p, SelfLockingParameters)
+        self.k = passive.coefficients(p, clutches, friction is None)
+        preload = clutched.full_friction(p)[1] if clutches else (0.0, 0.0)
+        self.u = passive.held(tuple(T), friction or preload)
+
+    def lost(self, w, s):
+        """Return the power that each element takes, W."""
+        return passive.lost_powers(self.k, self.u, self.point(w, s))
 
 
 class UncheckedParameters(SelfLockingParameters):
@@ -150,7 +179,7 @@ def self_locking_dissipation(p, w_1, w_2):
                              [w_0, w_1 - w_0, w_2 - w_0, w_s])
 
 
-def _form(quadratic, p):
+def form(quadratic, p):
     """Return the matrix of a quadratic form, 1/2 w' H w = quadratic(p, *w), by polarization."""
     a, b, both = (quadratic(p, *w) for w in ((1, 0), (0, 1), (1, 1)))
     return np.array([[2 * a, both - a - b], [both - a - b, 2 * b]])
@@ -164,7 +193,7 @@ def lagrange(p, energy, dissipation, power, w):
     torques Q, which do the virtual work ``power(w_1, w_2)``, linear in the speeds.
     """
     Q = np.array([power(1.0, 0.0), power(0.0, 1.0)])
-    return np.linalg.solve(_form(energy, p), Q - _form(dissipation, p) @ w)
+    return np.linalg.solve(form(energy, p), Q - form(dissipation, p) @ w)
 
 
 def symmetric_lagrange(p, w, T):

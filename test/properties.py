@@ -4,23 +4,38 @@
 """
 What a differential keeps to whatever is asked of it, checked shortly and, in ``long``, at length.
 
-``Tally``   random cases: one of the variants with random admissible parameters, spread over many
-            powers of ten, a random rate, start and load; case n is the same in every run
-``endure``  one load for a long time at 100 Hz
+``Tally``        random cases: one of the variants with random admissible parameters, spread over
+                 many powers of ten, a random rate, start and load; case n is always the same
+``check_state``  one random state under the passive law
+``endure``       one load for a long time at 100 Hz
 """
 
+import dataclasses
 import itertools
 import math
 from typing import NamedTuple
 
-from mechanisms import is_symmetric
+from mechanisms import (
+    form,
+    is_symmetric,
+    mirrored_self_locking,
+    mirrored_symmetric,
+    PassiveFlow,
+    random_self_locking,
+    random_symmetric,
+    relative_difference,
+    self_locking_energy,
+    symmetric_energy,
+)
 import numpy as np
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
-from dm_ros.mechanism import clutched, self_locking, symmetric
+from dm_ros.mechanism import clutched, passive, self_locking, symmetric
 from dm_ros.mechanism.self_locking import SelfLockingDae
 from dm_ros.mechanism.symmetric import SymmetricDae
 from dm_ros.mechanism.variants import variant_named
+from dm_ros.motion.energy import AuditedSimulation
+from dm_ros.motion.models import PAPER, PASSIVE
 
 ROUNDING = 1e-14     # of the largest term of a constraint
 TORQUE_LIMIT = 1e5   # N m
@@ -187,27 +202,31 @@ class Bound:
 class Tally:
     """What was counted over many cases, and the worst that was seen."""
 
-    def __init__(self):
+    def __init__(self, loss_law):
+        self.loss_law = loss_law
         self.cases = self.ticks = self.coarse_cases = self.coarse_steps = 0
         self.residual = 0.0   # of a constraint, over its largest term
-        self.fullest = 0.0    # speeds, over what energy allows
+        self.fullest = 0.0    # speeds, or energy, over what may be
 
     def __str__(self):
-        return (f'{self.cases} cases, {self.ticks} ticks, {self.coarse_steps} coarse steps in '
+        return (f'{self.loss_law}: {self.cases} cases, {self.ticks} ticks, {self.coarse_steps} coarse steps in '
                 f'{self.coarse_cases} cases, worst constraint residual {self.residual:.1e} of '
-                f'its largest term, speeds up to {self.fullest:.6f} of what energy allows')
+                f'its largest term, up to {self.fullest:.6f} of what energy allows')
 
     def run(self, n):
         """Run case n; raise AssertionError, with the case, whatever goes wrong."""
         case = random_case(n)
         try:
-            self._run(*case)
+            if self.loss_law == PAPER:
+                self._run(*case)
+            else:
+                self._run_passive(np.random.default_rng([4, n]), *case)
         except Exception as error:
             raise AssertionError(f'case {n}: {error!r}: {case}') from error
 
     def _run(self, variant, arguments, load):
         p, dt = arguments['parameters'], arguments['dt']
-        simulation, bound = Simulation(variant, **arguments), Bound(variant, p)
+        simulation, bound = Simulation(variant, loss_law=PAPER, **arguments), Bound(variant, p)
         # what the friction of variant 1 knows changes between the substeps
         bounded = variant != 'lsd_lagged' or simulation.substeps == 1
         g = constraints(variant, p)
@@ -225,8 +244,30 @@ class Tally:
                 assert speed <= allowed * (1 + 1e-9), (speed, allowed)
                 self.fullest = max(self.fullest, speed / allowed if allowed else 0.0)
             before = after
+        self._count(simulation)
+
+    def _run_passive(self, rng, variant, arguments, load):
+        p = dataclasses.replace(arguments['parameters'], sign_speed=power_of_ten(rng, -3, 2))
+        audit = AuditedSimulation(variant, loss_law=PASSIVE, **{**arguments, 'parameters': p})
+        g = constraints(variant, p)
+        H = form(symmetric_energy if is_symmetric(variant) else self_locking_energy, p)
+        self._check(audit.snapshot(), g)
+        for torque in load:
+            after = audit.step(torque)
+            self._check(after, g)
+            tick = after.energy
+            assert min(tick.viscous, *tick.gears, *tick.bearings, *tick.clutches) >= 0.0, tick
+            # an error of 1e-3 rad/s in a speed is worth that, times the momentum
+            worth = 1e-3 * np.abs(H @ after.velocity[1:3]).sum() + 1e-6 * np.abs(H).sum()
+            made = tick.stored - sum(tick.work)
+            assert made <= worth + 1e-12 * tick.scale, (made, worth, tick)
+            self.fullest = max(self.fullest, made / worth)
+        assert all(times == 0 for times, _ in audit.returned.values()), audit.returned
+        self._count(audit)
+
+    def _count(self, simulation):
         self.cases += 1
-        self.ticks += len(load)
+        self.ticks += simulation.ticks
         self.coarse_cases += simulation.coarse_steps > 0
         self.coarse_steps += simulation.coarse_steps
 
@@ -264,6 +305,55 @@ def independent(snapshot, p):
     if isinstance(p, SymmetricParameters):
         return omega[1:3]
     return omega[0], -omega[3] * p.g_2s * (1 + p.g_12)   # omega_1 - omega_2, not yet rounded
+
+
+# One state
+
+
+def random_state(rng, symmetric):
+    """Return random parameters, (carrier speed, slip) and torques, on every side of every kink."""
+    p = (random_symmetric if symmetric else random_self_locking)(rng)
+    p = dataclasses.replace(p, sign_speed=power_of_ten(rng, -3, 1))
+    y = tuple(rng.choice([-1.0, 1.0]) * power_of_ten(rng, -3, 2) for _ in range(2))
+    return p, y, rng.normal(0, 200, 3) * (rng.random(3) < 0.85)
+
+
+def check_state(rng, symmetric):
+    """Check that a random state has one solution, which loses power and keeps the symmetries."""
+    p, (w, s), T = random_state(rng, symmetric)
+    flow = PassiveFlow(p, T)
+    k, u, point = flow.k, flow.u, flow.point(w, s)
+    k_1s, k_2s = k.k_1 * s, k.k_2 * s
+
+    # each pattern of signs that agrees with its own solution has the same solution
+    q = [u[3] * point[8][5] + k.l_1 * k_1s - u[1], u[4] * point[8][6] - k.l_2 * k_2s - u[2]]
+    found = []
+    for signs in passive.PATTERNS:
+        wrong, _, solution = passive.solve(k, u, *q, point[8], signs)
+        if wrong <= 0.0:
+            found.append(solution[:7])
+    assert found, (p, w, s, T)
+    for solution in found:
+        assert relative_difference(solution, point[:7]) < 1e-10, (p, w, s, T)
+
+    # what goes in is stored or lost, and nothing is lost negatively
+    e = point[0] + k.k_1 * point[1], point[0] - k.k_2 * point[1]
+    energy = symmetric_energy if symmetric else self_locking_energy
+    outputs = np.array([w + k_1s, w - k_2s])
+    stored = outputs @ form(energy, p) @ e
+    powers = np.array([T[0] * (k.g_F or 1.0) * w, *(T[1:] * outputs)])
+    lost = flow.lost(w, s)
+    assert min(lost) >= 0.0, (p, w, s, T)
+    scale = np.abs(powers).sum() + abs(stored) + sum(lost)
+    assert abs(powers.sum() - stored - sum(lost)) <= 1e-11 * scale, (p, w, s, T)
+
+    # all turned round, and both sides exchanged
+    back = PassiveFlow(p, -T).point(-w, -s)
+    assert relative_difference(point[:7], np.negative(back[:7])) < 1e-10, (p, w, s, T)
+    mirrored = (mirrored_symmetric if symmetric else mirrored_self_locking)(p)
+    other = PassiveFlow(mirrored, T[[0, 2, 1]]).point(w, -s)
+    expected = (point[0], -point[1], point[3], point[2], point[5], point[4], point[6])
+    assert relative_difference(other[:7], expected) < 1e-10, (p, w, s, T)
 
 
 # Endurance

@@ -16,7 +16,7 @@ from dm_ros.mechanism.self_locking import balance, SelfLockingDae, SelfLockingOd
 from dm_ros.mechanism.symmetric import SymmetricDae
 from dm_ros.mechanism.variants import CATALOGUE, MECHANISMS, SELF_LOCKING, SYMMETRIC, variants_of
 from dm_ros.tools import compare_variants
-from dm_ros.tools.comparison import measures as measures
+from dm_ros.tools.comparison import laws, measures
 from dm_ros.tools.comparison import page as comparison_page
 from dm_ros.tools.comparison.claims import SILENT
 from dm_ros.tools.comparison.figures import FIGURES
@@ -76,23 +76,27 @@ def compare(*arguments):
     return compare_variants.main(['--duration', '0.1', *arguments])
 
 
-def page_in(path):
-    with open(os.path.join(path, 'index.html'), encoding='utf-8') as file:
+def page_in(path, name='index.html'):
+    with open(os.path.join(path, name), encoding='utf-8') as file:
         return file.read()
 
 
 def test_page_is_complete_and_shows_every_picture_that_lies_beside_it(capsys):
     assert compare() == 0
     assert 'index.html' in capsys.readouterr().out
-    assert sorted(os.listdir('comparison')) == sorted([*FIGURES, 'index.html'])
-    page = Page(page_in('comparison'))
-    assert page.open == [] and set(page.images) == set(FIGURES)
-    for name, source in page.images.items():
-        with open(os.path.join('comparison', name), 'rb') as file:
-            content = file.read()
-        assert content.startswith(b'\x89PNG') and content.endswith(b'IEND\xaeB\x60\x82')
-        assert source == 'data:image/png;base64,' + b64encode(content).decode()
-        assert name in page.links
+    laws_figures = {'laws-symmetric.png', 'laws-lsd.png'}
+    assert set(os.listdir('comparison')) == {*FIGURES, *laws_figures, 'index.html', 'laws.html'}
+    page, laws_page = Page(page_in('comparison')), Page(page_in('comparison', 'laws.html'))
+    assert page.open == [] == laws_page.open
+    assert set(page.images) == set(FIGURES) and set(laws_page.images) == laws_figures
+    assert 'laws.html' in page.links and 'index.html' in laws_page.links
+    for one in (page, laws_page):
+        for name, source in one.images.items():
+            with open(os.path.join('comparison', name), 'rb') as file:
+                content = file.read()
+            assert content.startswith(b'\x89PNG') and content.endswith(b'IEND\xaeB\x60\x82')
+            assert source == 'data:image/png;base64,' + b64encode(content).decode()
+            assert name in one.links
     for words in (*VARIANTS, 'What the paper says', 'Difference to the exact solution',
                   'µs a step', '10,000 Hz', 'the defaults', *comparison_page.TITLES.values()):
         assert words in page.text
@@ -103,6 +107,7 @@ def test_all_but_the_timings_is_the_same_in_each_run(monkeypatch):
     for out in 'ab':
         assert compare('--mechanism', 'symmetric', '--out', out) == 0
     assert page_in('a') == page_in('b')
+    assert page_in('a', 'laws.html') == page_in('b', 'laws.html')
 
 
 def test_own_load_and_parameters_are_taken_and_named():
@@ -172,10 +177,48 @@ def test_the_progress_bar_ends_where_it_said():
         assert sum(done) == ticks_of(mechanism, load)
 
 
+@pytest.fixture(scope='module')
+def outcomes():
+    """Return both laws on all cases of both mechanisms, the first three seconds of each."""
+    return {m: laws.run(m, Load(m, 3.0), {}, lambda n: None, 3.0) for m in MECHANISMS.values()}
+
+
+@pytest.mark.parametrize('mechanism', MECHANISMS.values(), ids=MECHANISMS)
+def test_the_energies_of_both_laws_add_up_and_only_the_paper_gives_back(outcomes, mechanism):
+    for name, pair in outcomes[mechanism].items():
+        assert [outcome.law for outcome in pair] == ['passive', 'paper']
+        for outcome in pair:
+            net = outcome.energy_in - outcome.energy_out
+            assert net == pytest.approx(outcome.work.sum(), abs=1e-9 * outcome.energy_in)
+            gears_and_bearings = [outcome.lost[n] for n in mechanism.gears + mechanism.bearings]
+            given = -np.minimum(gears_and_bearings, 0.0).sum(axis=0)
+            assert outcome.returned == pytest.approx(given)
+        passive, paper = pair
+        assert not passive.returned.any()
+        assert min(map(np.min, passive.lost.values())) >= 0.0
+        if name in ('cruise', 'weight', 'rest', 'power', 'held'):
+            assert paper.returned.sum() > 0.0, name
+
+
+
+def test_the_cases_show_what_the_laws_differ_in(outcomes):
+    for mechanism in MECHANISMS.values():
+        case = outcomes[mechanism]
+        for name in ('ramp', 'ripple', 'power', 'held', 'cruise', 'rest', 'weight'):
+            assert case[name][0].switches <= 1, name
+        assert min(case['held'][1].switches, case['power'][1].switches) > 1000
+        passive, paper = case['rest']
+        assert not passive.carrier.any() and abs(paper.carrier[-1]) > 100.0
+        passive, paper = case['cruise']   # out over in
+        assert passive.energy_out < passive.energy_in and paper.energy_out > paper.energy_in
+        passive, paper = case['weight']   # lowered by a creep, lifted by its losses
+        assert 0.0 < passive.carrier[-1] < 2 * 0.02 and paper.carrier[-1] < -0.5
+
+
 def test_sizes_in_the_table_are_those_of_the_equations():
     p, q = SymmetricParameters(), SelfLockingParameters()
     sizes = {'symmetric_ode': 2, 'symmetric_dae': len(SymmetricDae(p).system(1)[0]),
-             'lsd_lagged': len(balance(q, 1)[0]), 'lsd_ode': len(SelfLockingOde(q).system(1)[0]),
+             'lsd_lagged': len(balance(q, -1)[0]), 'lsd_ode': len(SelfLockingOde(q).system(1)[0]),
              'lsd_dae': len(SelfLockingDae(q).system(1)[0])}
     assert {name: len(v.unknowns.split()) for name, v in CATALOGUE.items()} == sizes
     assert comparison_page.GIVEN.keys() == sizes.keys()

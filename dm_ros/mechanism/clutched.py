@@ -133,7 +133,7 @@ def evaluate(k, u, w, s):
 
 def jacobian(k, u, point):
     """
-    Return (J_ww, J_ws, J_sw, J_ss, F_1w, F_1s, F_2w, F_2s) at a ``point``.
+    Return (J_ww, J_ws, J_sw, J_ss) and (F_1w, F_1s, F_2w, F_2s) at a ``point``.
 
     J is the Jacobian of dy/dt, and F_1w what F_1 grows with w, and so on.
     """
@@ -148,9 +148,9 @@ def jacobian(k, u, point):
     F_1w, F_2w = (d * r_1 - b * r_2) / det, (a * r_2 - c * r_1) / det
     r_1, r_2 = x_1 * k.P_1s + N_1, x_2 * k.P_2s + N_2
     F_1s, F_2s = (d * r_1 - b * r_2) / det, (a * r_2 - c * r_1) / det
-    return (k.A_ww - k.C_w1 * F_1w - k.C_w2 * F_2w, k.A_ws - k.C_w1 * F_1s - k.C_w2 * F_2s,
-            k.A_sw - k.C_s1 * F_1w - k.C_s2 * F_2w, k.A_ss - k.C_s1 * F_1s - k.C_s2 * F_2s,
-            F_1w, F_1s, F_2w, F_2s)
+    return ((k.A_ww - k.C_w1 * F_1w - k.C_w2 * F_2w, k.A_ws - k.C_w1 * F_1s - k.C_w2 * F_2s,
+             k.A_sw - k.C_s1 * F_1w - k.C_s2 * F_2w, k.A_ss - k.C_s1 * F_1s - k.C_s2 * F_2s),
+            (F_1w, F_1s, F_2w, F_2s))
 
 
 def solve_moments(z, W, x):

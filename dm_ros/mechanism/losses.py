@@ -25,7 +25,7 @@ def lost_in_bearing(eta):
 
 @dataclass(frozen=True, slots=True)
 class SymmetricLosses:
-    """The coefficients of ``symmetric``, for one direction of power flow."""
+    """The coefficients of ``symmetric``, for one flow of power."""
 
     drag_w: float      # of carrier and pinion against the housing, per w^2
     drag_s: float      # of side gears and satellites in the carrier, per s^2
@@ -35,19 +35,29 @@ class SymmetricLosses:
     mesh_F: float      # shares lost
     mesh_1: float
     mesh_2: float
-    bearing_3: float
-    bearing_0: float
-    direct: float      # 1 in direct flow, otherwise 0
-    reverse: float
+    pinion_F: float    # what of its load the pinion bearing loses: of M_F, T_3 and drag
+    pinion_T: float
+    pinion_L: float
+    carrier_1: float   # what of its load the carrier bearing loses: of M_1, M_2, M_F and drag
+    carrier_2: float
+    carrier_F: float
+    carrier_L: float
 
 
 def symmetric_losses(p, direction):
     """Return the ``SymmetricLosses`` of parameters."""
-    direct = float(direction == DIRECT)
+    direct, reverse = (1.0, 0.0) if direction == DIRECT else (0.0, 1.0)
+    bearing_3, bearing_0 = lost_in_bearing(p.eta_3B), lost_in_bearing(p.eta_0B)
     return SymmetricLosses(
-        p.l_0 + p.l_3 * p.g_F**2, (p.l_1 + p.l_2 + p.n_s * p.l_s / p.g_2s**2) / 4,
-        p.l_3 * p.g_F**2, p.l_0, (p.l_1 - p.l_2) / 2, 1 - p.eta_FG, 1 - p.eta_1G, 1 - p.eta_2G,
-        lost_in_bearing(p.eta_3B), lost_in_bearing(p.eta_0B), direct, 1.0 - direct)
+        *symmetric_drag(p), 1 - p.eta_FG, 1 - p.eta_1G, 1 - p.eta_2G,
+        bearing_3 * direct, -bearing_3 * reverse, bearing_3,
+        bearing_0 * direct, bearing_0 * direct, bearing_0 * reverse, bearing_0)
+
+
+def symmetric_drag(p):
+    """Return the first five of ``SymmetricLosses``."""
+    return (p.l_0 + p.l_3 * p.g_F**2, (p.l_1 + p.l_2 + p.n_s * p.l_s / p.g_2s**2) / 4,
+            p.l_3 * p.g_F**2, p.l_0, (p.l_1 - p.l_2) / 2)
 
 
 def symmetric(k, ww, ws, ss, M_F_w, M_1_w1, M_2_w2, M_1_w, M_2_w, T_3_w3):
@@ -58,9 +68,9 @@ def symmetric(k, ww, ws, ss, M_F_w, M_1_w1, M_2_w2, M_1_w, M_2_w, T_3_w3):
     """
     return (k.drag_w * ww + k.drag_s * ss,
             k.mesh_F * M_F_w, k.mesh_1 * M_1_w1, k.mesh_2 * M_2_w2,
-            k.bearing_3 * (k.pinion_w * ww + k.direct * M_F_w - k.reverse * T_3_w3),
-            k.bearing_0 * (k.carrier_w * ww - k.carrier_s * ws
-                           + k.direct * (M_1_w + M_2_w) + k.reverse * M_F_w))
+            k.pinion_L * k.pinion_w * ww + k.pinion_F * M_F_w + k.pinion_T * T_3_w3,
+            k.carrier_L * (k.carrier_w * ww - k.carrier_s * ws)
+            + k.carrier_1 * M_1_w + k.carrier_2 * M_2_w + k.carrier_F * M_F_w)
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,6 +95,11 @@ def efficiency(part, default):
                f'efficiency of the {part.replace("_", " ")}', above_low=True)
 
 
+def mesh_sign_speed():
+    return row('mesh_sign_speed', 0.02, 'rad/s', 1e-3, 1e2,
+               'passive law: speed of a shaft at which its mesh takes three quarters of its loss')
+
+
 def satellite_count(default):
     return row('satellite_count', default, '1', 1, 64, 'number of satellites', kind=int)
 
@@ -175,6 +180,7 @@ class SymmetricParameters(Parameters):
     eta_0B: float = efficiency('carrier_bearing', 0.995)
     eta_1G: float = efficiency('left_mesh', 0.99)
     eta_2G: float = efficiency('right_mesh', 0.99)
+    sign_speed: float = mesh_sign_speed()
 
     @property
     def rated_efficiency(self):
@@ -239,6 +245,7 @@ class SelfLockingParameters(Parameters):
     eta_0B: float = efficiency('carrier_bearing', 0.995)
     eta_1G: float = efficiency('front_mesh', 0.99)
     eta_2G: float = efficiency('rear_mesh', 0.99)
+    sign_speed: float = mesh_sign_speed()
     alpha: float = row('pressure_angle', math.radians(20.0), 'rad', 0.0, 1.5,
                        'gearing angle; 0 takes away the load-proportional friction')
     n_F1: int = clutch('front', 'n_F')

@@ -32,8 +32,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dm_ros.mechanism.efficiencies import of_flow
 from dm_ros.mechanism.ports import acting_on, torque
-from dm_ros.mechanism.power_flow import DIRECT
+from dm_ros.mechanism.power_flow import REVERSE
 
 SHAFTS = ('carrier', 'front', 'rear', 'satellite')
 PORTS = torque('carrier'), torque('front'), torque('rear')
@@ -75,7 +76,7 @@ def viscosities(p):
     return np.diag([p.l_0, p.l_1, p.l_2, p.l_s])
 
 
-def balance(p, direction):
+def balance(p, flow):
     """
     Return I_D (2, 2), eta_T (2, 3), eta_L (2, 4), eta_F (2, 2): (61)-(63) direct, (69) reverse.
 
@@ -84,17 +85,20 @@ def balance(p, direction):
     """
     g, n = p.g_12, p.n_s / p.g_2s
     satellite = p.I_s * n / (p.g_2s * (1 + g))
-    if direction == DIRECT:
-        eta_1L, eta_2L = 1 / p.eta_1G - 1, 1 / p.eta_2G - 1
+    if flow != REVERSE:
+        eta = flow
+        eta_0, eta_0L = eta.carrier_mesh, eta.carrier_drag
+        eta_1L, eta_2L = eta_0L / eta_0 / eta.mesh_1 - 1, eta_0L / eta_0 / eta.mesh_2 - 1
         I_D = np.array([
-            [p.I_0 / (1 + g) + p.I_1 / (p.eta_1G * p.eta_0B),
-             p.I_0 * g / (1 + g) + p.I_2 / (p.eta_2G * p.eta_0B)],
-            [-(p.I_1 * g / p.eta_1G + satellite), p.I_2 / p.eta_2G + satellite]])
+            [p.I_0 / (1 + g) + p.I_1 / (eta.mesh_1 * eta_0),
+             p.I_0 * g / (1 + g) + p.I_2 / (eta.mesh_2 * eta_0)],
+            [-(p.I_1 * g / eta.mesh_1 + satellite), p.I_2 / eta.mesh_2 + satellite]])
         eta_t = np.array([
-            [1, 1 / (p.eta_1G * p.eta_0B), 1 / (p.eta_2G * p.eta_0B)],
-            [0, -g / p.eta_1G, 1 / p.eta_2G]])
-        relative = [-g / p.eta_1G, 1 / p.eta_2G]
+            [eta.carrier_input, 1 / (eta.mesh_1 * eta_0), 1 / (eta.mesh_2 * eta_0)],
+            [0, -g / eta.mesh_1, 1 / eta.mesh_2]])
+        relative = [-g / eta.mesh_1, 1 / eta.mesh_2]
     else:
+        eta_0L = p.eta_0B
         eta_1L, eta_2L = p.eta_1G * p.eta_0B - 1, p.eta_2G * p.eta_0B - 1
         I_D = np.array([
             [p.I_0 / (1 + g) + p.I_1 * p.eta_1G, p.I_0 * g / (1 + g) + p.I_2 * p.eta_2G],
@@ -104,10 +108,10 @@ def balance(p, direction):
             [0, -g * p.eta_1G, p.eta_2G]])
         relative = [-g * p.eta_1G, p.eta_2G]
     eta_l = np.array([
-        [1 / p.eta_0B, eta_1L / p.eta_0B, eta_2L / p.eta_0B, 0],
+        [1 / eta_0L, eta_1L / eta_0L, eta_2L / eta_0L, 0],
         [0, *relative, n]])
     eta_f = np.array([
-        [eta_1L / p.eta_0B, eta_2L / p.eta_0B],
+        [eta_1L / eta_0L, eta_2L / eta_0L],
         relative])
     return I_D, eta_t, eta_l, eta_f
 
@@ -131,16 +135,16 @@ class SelfLockingLagged:
     def __init__(self, parameters):
         self.p = parameters
 
-    def response(self, direction):
-        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
-        p = self.p
-        I_D, eta_t, eta_l, eta_f = balance(p, direction)
+    def response(self, flow):
+        """Return the ``LinearResponse`` for a flow: DIRECT, REVERSE, or ``Efficiencies``."""
+        p, flow = self.p, of_flow(self.p, flow)
+        I_D, eta_t, eta_l, eta_f = balance(p, flow)
         L = viscous(p)
         A, B, C = (np.linalg.solve(I_D, m)
                    for m in (-eta_l @ L, eta_t @ ON_SHAFTS[:3], eta_f))                  # (67)
         I_G, T_G, E = np.diag([p.I_1, p.I_2]), ON_SHAFTS[1:3], np.eye(2)
         P, Q, W = I_G @ A + L[1:3], I_G @ B - T_G, I_G @ C - E
-        eta_G = np.diag([p.eta_1G, p.eta_2G]) if direction == DIRECT else -E
+        eta_G = np.diag([flow.mesh_1, flow.mesh_2]) if flow != REVERSE else -E
         P, Q, W = (np.linalg.solve(eta_G, m) for m in (P, Q, W))                  # (68), (70)
         S = slip_coordinates(p)
         S_inverse = np.linalg.inv(S)
@@ -155,24 +159,24 @@ class SelfLockingOde:
     def __init__(self, parameters):
         self.p = parameters
 
-    def system(self, direction):
+    def system(self, flow):
         """
         Return G_D (4, 4), eta_T (4, 3), eta_L (4, 4), eta_F (4, 2): (72)-(73), (76)-(77).
 
         They make G_D x + eta_F F + eta_L L - eta_T T = 0 with x = (e_1, e_2, M_1, M_2), (75).
         """
-        p = self.p
-        I_D, eta_t, eta_l, eta_f = balance(p, direction)
-        eta_M = -np.diag([p.eta_1G, p.eta_2G]) if direction == DIRECT else np.eye(2)
+        p, flow = self.p, of_flow(self.p, flow)
+        I_D, eta_t, eta_l, eta_f = balance(p, flow)
+        eta_M = -np.diag([flow.mesh_1, flow.mesh_2]) if flow != REVERSE else np.eye(2)
         G_D = np.block([[I_D, np.zeros((2, 2))], [np.diag([p.I_1, p.I_2]), eta_M]])
         eta_t = np.vstack([eta_t, np.eye(2, 3, k=1)])
         eta_l = np.vstack([eta_l, np.eye(2, 4, k=1)])
         eta_f = np.vstack([eta_f, np.eye(2)])   # erratum (76): four rows
         return G_D, eta_t, eta_l, eta_f
 
-    def response(self, direction):
-        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
-        G_D, eta_t, eta_l, eta_f = self.system(direction)
+    def response(self, flow):
+        """Return the ``LinearResponse`` for a flow: DIRECT, REVERSE, or ``Efficiencies``."""
+        G_D, eta_t, eta_l, eta_f = self.system(flow)
         S = slip_coordinates(self.p)
         A, B, C = (np.linalg.solve(G_D, m)
                    for m in (-eta_l @ viscous(self.p) @ np.linalg.inv(S),
@@ -205,36 +209,39 @@ class SelfLockingDae:
         """Return the matrix (4, 2) that gives all speeds from y, such that g_omega omega = 0."""
         return np.linalg.inv(np.vstack([self.constraints(), [1, 0, 0, 0], [0, 1, -1, 0]]))[:, 2:]
 
-    def system(self, direction):
+    def system(self, flow):
         """
         Return G_D (6, 6), g_T (6, 3), g_L (6, 4), g_F (6, 2): (79)-(83), (86), (88).
 
         They make G_D x + g_F F + g_L omega - g_T T = 0 with x = (e_0, e_1, e_2, e_s, M_1, M_2),
         (87).
         """
-        p = self.p
-        if direction == DIRECT:
+        p, flow = self.p, of_flow(self.p, flow)
+        eta_t = np.eye(4, 3)
+        if flow != REVERSE:
+            eta = flow
+            eta_0L = eta.carrier_drag
             eta_m = np.array([
-                [1 / p.eta_0B, 1 / p.eta_0B],
-                [-p.eta_1G, 0],
-                [0, -p.eta_2G],
+                [1 / eta.carrier_mesh, 1 / eta.carrier_mesh],
+                [-eta.mesh_1, 0],
+                [0, -eta.mesh_2],
                 [-p.g_12, 1]])
-            eta_t = np.eye(4, 3)
+            eta_t[0, 0] = eta.carrier_input
         else:
+            eta_0L = p.eta_0B
             eta_m = np.array([
                 [-p.eta_1G, -p.eta_2G],
                 [1, 0],
                 [0, 1],
                 [p.g_12 * p.eta_1G, -p.eta_2G]])
-            eta_t = np.eye(4, 3)
             eta_t[0, 0] = 1 / p.eta_0B   # erratum 4.7.2: a second matrix changes
         eta_f = np.array([
-            [-1 / p.eta_0B, -1 / p.eta_0B],
+            [-1 / eta_0L, -1 / eta_0L],
             [1, 0],
             [0, 1],
             [0, 0]])
         eta_l = np.array([
-            [1 / p.eta_0B, -1 / p.eta_0B, -1 / p.eta_0B, 0],
+            [1 / eta_0L, -1 / eta_0L, -1 / eta_0L, 0],
             [0, 1, 0, 0],
             [0, 0, 1, 0],
             [0, 0, 0, p.n_s / p.g_2s]])
@@ -249,9 +256,9 @@ class SelfLockingDae:
                          for m in (eta_t, eta_l @ viscosities(p) @ e_omega, eta_f))
         return G_D, g_T, g_L, g_F
 
-    def response(self, direction):
-        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
-        G_D, g_T, g_L, g_F = self.system(direction)
+    def response(self, flow):
+        """Return the ``LinearResponse`` for a flow: DIRECT, REVERSE, or ``Efficiencies``."""
+        G_D, g_T, g_L, g_F = self.system(flow)
         A, B, C = (np.linalg.solve(G_D, m)
                    for m in (-g_L @ self.lift(), g_T @ ON_SHAFTS[:3], g_F))
         to_y = np.array([[1, 0, 0, 0], [0, 1, -1, 0]])   # (e_0, e_1 - e_2)

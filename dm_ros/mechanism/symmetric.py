@@ -14,7 +14,8 @@ carrier, left, right, pinion, satellite. ``T`` holds the torques on the ports, i
 torque is positive when it accelerates its shaft. Where a printed equation contradicts the others,
 the corrected form stands here, marked "erratum", and a test shows that the printed one fails.
 
-Under held torques both are linear. Each gives, for one direction (+1 direct, -1 reverse),
+Under held torques both are linear. Each gives, for one flow of power (direct, reverse, or
+what stands for the efficiencies of direct flow under the passive law, see ``efficiencies``),
 
     e_D = A omega_D + B T        omega_D = (omega_1, omega_2), e_D = d omega_D/dt
     M   = P omega_D + Q T        M = (M_F, M_1, M_2), in the sign of the paper
@@ -25,8 +26,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dm_ros.mechanism.efficiencies import of_flow
 from dm_ros.mechanism.ports import acting_on, torque
-from dm_ros.mechanism.power_flow import DIRECT
+from dm_ros.mechanism.power_flow import REVERSE
 
 SHAFTS = ('carrier', 'left', 'right', 'pinion', 'satellite')
 PORTS = torque('pinion'), torque('left'), torque('right')
@@ -66,31 +68,36 @@ class SymmetricOde:
         p = self.p
         return np.array([p.I_0, p.I_1, p.I_2, p.I_3, p.I_s])
 
-    def efficiencies(self, direction):
+    def efficiencies(self, flow):
         """Return eta_Sigma, eta_S, eta_T, eta_L: (26), (28), (30) direct, (38)-(39) reverse."""
         p = self.p
         satellite = p.n_s / (2 * p.g_2s**2)
-        if direction == DIRECT:
-            eta_0 = p.eta_FG * p.eta_0B
-            eta_1L, eta_2L = 1 / p.eta_1G - 1, 1 / p.eta_2G - 1
+        if flow != REVERSE:
+            eta = flow
+            eta_F = eta.mesh_F * eta.carrier_input
+            eta_0, eta_0L = eta_F * eta.carrier_mesh, eta_F * eta.carrier_drag
+            share = eta.carrier_drag / eta.carrier_mesh
+            eta_1L, eta_2L = share / eta.mesh_1 - 1, share / eta.mesh_2 - 1
             eta_sigma = np.array([
-                [1 / (2 * p.eta_FG), 1 / (2 * p.eta_FG)],
-                [1 / (eta_0 * p.eta_1G), 0],
-                [0, 1 / (eta_0 * p.eta_2G)],
-                [p.g_F**2 * p.eta_3B / 2, p.g_F**2 * p.eta_3B / 2],
+                [1 / (2 * eta_F), 1 / (2 * eta_F)],
+                [1 / (eta_0 * eta.mesh_1), 0],
+                [0, 1 / (eta_0 * eta.mesh_2)],
+                [p.g_F**2 * eta.pinion_mesh / 2, p.g_F**2 * eta.pinion_mesh / 2],
                 [0, 0]])
             eta_s = np.array([
                 [0, 0],
-                [-1 / p.eta_1G, 0],
-                [0, 1 / p.eta_2G],
+                [-1 / eta.mesh_1, 0],
+                [0, 1 / eta.mesh_2],
                 [0, 0],
                 [-satellite, satellite]])
             eta_t = np.array([
-                [1 / (eta_0 * p.eta_1G), 1 / (eta_0 * p.eta_2G), p.eta_3B],
-                [-1 / p.eta_1G, 1 / p.eta_2G, 0]])
+                [1 / (eta_0 * eta.mesh_1), 1 / (eta_0 * eta.mesh_2),
+                 eta.pinion_mesh * eta.pinion_input],
+                [-1 / eta.mesh_1, 1 / eta.mesh_2, 0]])
             eta_l = np.array([   # erratum (30): no eta_kG below eta_kL
-                [1 / eta_0, eta_1L / eta_0, eta_2L / eta_0, 1, 0],
-                [0, -1 / p.eta_1G, 1 / p.eta_2G, 0, 1]])
+                [1 / eta_0L, eta_1L / eta_0L, eta_2L / eta_0L,
+                 eta.pinion_mesh / eta.pinion_drag, 0],
+                [0, -1 / eta.mesh_1, 1 / eta.mesh_2, 0, 1]])
         else:
             eta_1L, eta_2L = p.eta_0B * p.eta_1G - 1, p.eta_0B * p.eta_2G - 1
             eta_sigma = np.array([
@@ -120,10 +127,10 @@ class SymmetricOde:
         # erratum (31): the speeds of all elements, omega and not omega_D
         return np.diag([p.l_0, p.l_1, p.l_2, p.l_3, p.l_s]) @ (kinematics(p) - g_H)
 
-    def response(self, direction):
-        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
-        p = self.p
-        eta_sigma, eta_s, eta_t, eta_l = self.efficiencies(direction)
+    def response(self, flow):
+        """Return the ``LinearResponse`` for a flow: DIRECT, REVERSE, or ``Efficiencies``."""
+        p, flow = self.p, of_flow(self.p, flow)
+        eta_sigma, eta_s, eta_t, eta_l = self.efficiencies(flow)
         I_D = np.array([self.inertia() @ eta_sigma, self.inertia() @ eta_s])          # (25), (27)
         g_T = np.diag([1, 1, p.g_F]) @ ON_SHAFTS[1:4]            # (28) of T_D = (T_1, T_2, T_3)
         g_L = np.diag([1, 1, 1, p.g_F, p.n_s / p.g_2s])                                # (30)
@@ -133,11 +140,13 @@ class SymmetricOde:
 
         # the moments: M_F from (17) or the pinion equation in reverse flow, M_k from (10)
         e = np.array([[0.5, 0.5], [1, 0], [0, 1]])   # (e_0, e_1, e_2) from e_D
-        if direction == DIRECT:
-            eta_M = np.diag([1, 1 / p.eta_1G, 1 / p.eta_2G])
-            inertia = np.diag([-p.I_3 * p.g_F**2 * p.eta_3B, p.I_1, p.I_2])
-            drag = np.array([-p.g_F * L[3], L[1], L[2]])
-            load = np.array([[0, 0, p.g_F * p.eta_3B], [-1, 0, 0], [0, -1, 0]])
+        if flow != REVERSE:
+            eta = flow
+            eta_M = np.diag([1, 1 / eta.mesh_1, 1 / eta.mesh_2])
+            inertia = np.diag([-p.I_3 * p.g_F**2 * eta.pinion_mesh, p.I_1, p.I_2])
+            drag = np.array([-p.g_F * (eta.pinion_mesh / eta.pinion_drag) * L[3], L[1], L[2]])
+            load = np.array([[0, 0, p.g_F * eta.pinion_mesh * eta.pinion_input],
+                             [-1, 0, 0], [0, -1, 0]])
         else:
             eta_M = np.diag([1 / p.eta_FG, 1, 1])
             inertia = np.diag([p.I_3 * p.g_F**2, -p.I_1, -p.I_2])
@@ -178,24 +187,21 @@ class SymmetricDae:
         N[self.DEPENDENT] = -np.linalg.solve(g[:, self.DEPENDENT], g[:, self.INDEPENDENT])
         return N
 
-    def efficiencies(self, direction):
+    def efficiencies(self, flow):
         """Return eta_M (5, 3), eta_L (5, 5) and eta_T (5, 5): (42) direct, (52) reverse."""
         p = self.p
-        eta_l = np.array([
-            [1 / p.eta_0B, -1 / p.eta_0B, -1 / p.eta_0B, 0, 0],
-            [0, 1, 0, 0, 0],
-            [0, 0, 1, 0, 0],
-            [0, 0, 0, 1 / p.eta_3B, 0],
-            [0, 0, 0, 0, 1]])
-        if direction == DIRECT:
+        if flow != REVERSE:
+            eta = flow
+            eta_0L, eta_3L = eta.carrier_drag, eta.pinion_drag
             eta_m = np.array([
-                [-p.eta_FG, 1 / p.eta_0B, 1 / p.eta_0B],
-                [0, -p.eta_1G, 0],
-                [0, 0, -p.eta_2G],
-                [1 / p.eta_3B, 0, 0],
+                [-eta.mesh_F * eta.carrier_input, 1 / eta.carrier_mesh, 1 / eta.carrier_mesh],
+                [0, -eta.mesh_1, 0],
+                [0, 0, -eta.mesh_2],
+                [1 / eta.pinion_mesh, 0, 0],
                 [0, -1, 1]])
-            eta_t = np.eye(5)
+            eta_t = np.diag([1, 1, 1, eta.pinion_input, 1])
         else:
+            eta_0L, eta_3L = p.eta_0B, p.eta_3B
             eta_m = np.array([   # erratum (52): eta_kG in the satellite row
                 [1 / p.eta_0B, -p.eta_1G, -p.eta_2G],
                 [0, 1, 0],
@@ -203,12 +209,18 @@ class SymmetricDae:
                 [-p.eta_FG, 0, 0],
                 [0, p.eta_1G, -p.eta_2G]])
             eta_t = np.diag([1, 1, 1, 1 / p.eta_3B, 1])   # erratum (52): T_3/eta_3B
+        eta_l = np.array([
+            [1 / eta_0L, -1 / eta_0L, -1 / eta_0L, 0, 0],
+            [0, 1, 0, 0, 0],
+            [0, 0, 1, 0, 0],
+            [0, 0, 0, 1 / eta_3L, 0],
+            [0, 0, 0, 0, 1]])
         return eta_m, eta_l, eta_t
 
-    def system(self, direction):
+    def system(self, flow):
         """Return A (8, 8) and B (8, 8) of x' = A x + B u, x = (omega, K), (49)-(51)."""
         p = self.p
-        eta_m, eta_l, eta_t = self.efficiencies(direction)
+        eta_m, eta_l, eta_t = self.efficiencies(of_flow(p, flow))
         inertia = np.diag([p.I_0, p.I_1, p.I_2, p.I_3, p.I_s])
         g = np.diag([1, 1, 1, p.g_F, p.n_s / p.g_2s])   # erratum (41): five entries
         l_omega = np.diag([p.l_0, p.l_1, p.l_2, p.l_3, p.l_s])
@@ -224,9 +236,9 @@ class SymmetricDae:
         g_T = np.block([[eta_t @ g, np.zeros((5, 3))], [np.zeros((3, 8))]])
         return -np.linalg.solve(I_D, g_L), np.linalg.solve(I_D, g_T)
 
-    def response(self, direction):
-        """Return the ``LinearResponse`` for direct (+1) or reverse (-1) power flow."""
-        A, B = self.system(direction)
+    def response(self, flow):
+        """Return the ``LinearResponse`` for a flow: DIRECT, REVERSE, or ``Efficiencies``."""
+        A, B = self.system(flow)
         A, B = A[:, :5] @ self.lift(), B[:, :5] @ ON_SHAFTS   # T_D of (48), 0 where no port is
         return LinearResponse(A[self.INDEPENDENT], B[self.INDEPENDENT], A[5:], B[5:])
 

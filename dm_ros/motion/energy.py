@@ -193,7 +193,7 @@ class AuditedSimulation(Simulation):
 
     def prepare(self, parameters, substeps=None):
         model, substeps = super().prepare(parameters, substeps)
-        return model, substeps, meter_of(self.mechanism, model)
+        return model, substeps, meter_of(model)
 
     def adopt(self, prepared):
         *prepared, self._meter = prepared

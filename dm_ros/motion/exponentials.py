@@ -28,6 +28,42 @@ def held_propagator(A, B, h):
     return E[n:2 * n, n:2 * n], E[n:2 * n, 2 * n:], E[:n, n:2 * n], E[:n, 2 * n:]
 
 
+def product(X, Y):
+    """Return the product of two 2x2 matrices, each (11, 12, 21, 22)."""
+    a, b, c, d = X
+    e, f, g, h = Y
+    return a * e + b * g, a * f + b * h, c * e + d * g, c * f + d * h
+
+
+def phi_matrices(Z):
+    """
+    Return phi_1(Z) and phi_2(Z) of a 2x2 matrix, in plain floats to rounding.
+
+    By Taylor's series of Z/2^n, doubled n times: phi_2(2Z) = (phi_1(Z)^2 + 2 phi_2(Z))/4,
+    phi_1(2Z) = (e^Z + 1) phi_1(Z)/2 and e^2Z = (e^Z)^2.
+
+    :param Z: (11, 12, 21, 22).
+    """
+    size = max(abs(Z[0]) + abs(Z[1]), abs(Z[2]) + abs(Z[3]))
+    doublings = max(0, math.frexp(size)[1] + 2)
+    small = tuple([math.ldexp(z, -doublings) for z in Z])
+    # 1/2! + Z/3! + Z^2/4! + ... by Horner's rule
+    a, b, c, d = 1.0, 0.0, 0.0, 1.0
+    for n in range(16, 2, -1):
+        e, f, g, h = product(small, (a, b, c, d))
+        a, b, c, d = 1 + e / n, f / n, g / n, 1 + h / n
+    second = a / 2, b / 2, c / 2, d / 2
+    a, b, c, d = product(small, second)
+    first = 1 + a, b, c, 1 + d
+    a, b, c, d = product(small, first)
+    a, d = 1 + a, 1 + d
+    for _ in range(doublings):
+        second = tuple([(x + 2 * y) / 4 for x, y in zip(product(first, first), second)])
+        first = tuple([x / 2 for x in product((1 + a, b, c, 1 + d), first)])
+        a, b, c, d = product((a, b, c, d), (a, b, c, d))
+    return first, second
+
+
 def phi_2(z):
     """Return (e^z - 1 - z)/z^2 of a real or complex number."""
     if abs(z) < 0.02:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dm_ros.motion.exponentials import held_propagator
+from dm_ros.motion.exponentials import held_propagator, phi_matrices, product
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +41,27 @@ class HeldTorqueStep:
     Theta_22: float
 
 
-def held_torque_step(response, h):
-    """Return the ``HeldTorqueStep`` of a ``LinearResponse`` over h, s."""
-    Phi, Gamma, Psi, Theta = held_propagator(response.A, response.B, h)
+def held_torque_step(A, B, h):
+    """Return the ``HeldTorqueStep`` over h, s, of dx/dt = A x + B T."""
+    Phi, Gamma, Psi, Theta = held_propagator(A, B, h)
     rows = np.vstack([np.hstack([Phi, Gamma]), np.hstack([Psi, Theta])])
     return HeldTorqueStep(*rows.ravel().tolist())
+
+
+def held_torque_step_by_floats(A, B, h):
+    """Return the same in plain floats, which is quick enough for the middle of a run."""
+    A, B = A.ravel().tolist(), B.tolist()
+    first, second = phi_matrices([h * a for a in A])
+    rows = []
+    # x + h phi_1 (A x + B T), and its integral h x + h^2 phi_2 (A x + B T)
+    for phi, of_x, of_slope in ((first, 1.0, h), (second, h, h * h)):
+        a, b, c, d = product(phi, A)
+        (e, f), (g, i) = phi[:2], phi[2:]
+        rows += [of_x + of_slope * a, of_slope * b,
+                 *(of_slope * (e * u + f * v) for u, v in zip(*B)),
+                 of_slope * c, of_x + of_slope * d,
+                 *(of_slope * (g * u + i * v) for u, v in zip(*B))]
+    return HeldTorqueStep(*rows)
 
 
 def step(k, x, T):

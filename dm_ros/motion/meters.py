@@ -17,10 +17,17 @@ from operator import add
 
 import numpy as np
 
-from dm_ros.mechanism import losses, self_locking, symmetric
+from dm_ros.mechanism import losses, passive, self_locking, symmetric
 from dm_ros.mechanism.clutched import evaluate
-from dm_ros.mechanism.variants import SELF_LOCKING, SYMMETRIC
-from dm_ros.motion.exponentials import held_propagator, way
+from dm_ros.motion.exponentials import way
+from dm_ros.motion.models import (
+    PassiveModel,
+    PassiveSymmetricModel,
+    SelfLockingModel,
+    SymmetricModel,
+)
+from dm_ros.motion.patterns import Pattern, TO_SLIP
+from dm_ros.motion.quadrature import rule_for, second_moment_of_the_way
 
 
 def kinetic_form(inertias, shafts):
@@ -45,108 +52,77 @@ def energy_gained(m, start, end):
             + (y_2 - x_2) * (m_12 * s_1 + m_22 * s_2)) / 2
 
 
-def pairs_of(n):
-    """
-    Return the matrices between the n^2 entries of z z' and the n (n + 1)/2 that differ.
-
-    :return: ``spread`` (n^2, n (n + 1)/2), from those that differ to all, and ``pick``, back.
-    """
-    entries = [(i, j) for i in range(n) for j in range(n)]
-    different = [(i, j) for i, j in entries if i <= j]
-    spread = np.array([[tuple(sorted(entry)) == pair for pair in different] for entry in entries])
-    pick = np.array([[entry == pair for entry in entries] for pair in different])
-    return spread.astype(float), pick.astype(float)
+def leads_far(w, s, d_w, d_s):
+    """Return whether speeds change by more than a small part of them."""
+    return abs(d_w) + abs(d_s) > 0.05 * (abs(w) + abs(s))
 
 
-def second_moment_of_the_way(A, h):
+def linear_book(second, k, q, m, g_F, h, start, end, integral, T):
     """
-    Return the matrix (3, 3) that gives the integral of q q' from d d', both as (11, 12, 22).
+    Return the energies of an exact step of a symmetric differential, see the module.
 
-    q is the way from the start of a step of x' = A x + b, and d the whole of it: q' = A q + g with
-    a constant g. So z = (q, g) and z z' obey linear equations.
+    :param second: of ``second_moment_of_the_way``; k: ``Moments``; q: ``SymmetricLosses``;
+        m: the form of the kinetic energy; all of them, and the speeds, in (w, s).
     """
-    spread, pick = pairs_of(4)
-    K = np.zeros((4, 4))
-    K[:2, :2], K[:2, 2:] = A, np.eye(2)
-    both = pick @ (np.kron(K, np.eye(4)) + np.kron(np.eye(4), K)) @ spread
-    _, _, integral, _ = held_propagator(both, np.zeros((10, 0)), h)
-    _, reach, _, _ = held_propagator(A, np.eye(2), h)
-    (a, b), (c, d) = np.linalg.inv(reach)   # g from d
-    from_d = np.array([[a * a, 2 * a * b, b * b], [a * c, a * d + b * c, b * d],
-                       [c * c, 2 * c * d, d * d]])
-    return integral[np.ix_([0, 1, 4], [7, 8, 9])] @ from_d
+    (w, s), (w_end, s_end), (a_w, a_s), (T_3, T_1, T_2) = start, end, integral, T
+    k_11, k_12, k_13, k_21, k_22, k_23, k_31, k_32, k_33 = second
+    # the integral of x x'
+    d_w, d_s = w_end - w, s_end - s
+    d_ww, d_ws, d_ss = d_w * d_w, d_w * d_s, d_s * d_s
+    b_w, b_s = a_w - h * w, a_s - h * s
+    X_ww = w * (a_w + b_w) + k_11 * d_ww + k_12 * d_ws + k_13 * d_ss
+    X_ws = w * a_s + s * b_w + k_21 * d_ww + k_22 * d_ws + k_23 * d_ss
+    X_ss = s * (a_s + b_s) + k_31 * d_ww + k_32 * d_ws + k_33 * d_ss
+    # of moments and speeds: M = P x + Q T
+    M_F = k.Q_F3 * T_3 + k.Q_F1 * T_1 + k.Q_F2 * T_2
+    M_1 = k.Q_13 * T_3 + k.Q_11 * T_1 + k.Q_12 * T_2
+    M_2 = k.Q_23 * T_3 + k.Q_21 * T_1 + k.Q_22 * T_2
+    M_1_w, M_2_w = (k.P_11 * X_ww + k.P_12 * X_ws + M_1 * a_w,
+                    k.P_21 * X_ww + k.P_22 * X_ws + M_2 * a_w)
+    T_3_w3 = T_3 * g_F * a_w
+    lost = losses.symmetric(
+        q, X_ww, X_ws, X_ss, k.P_F1 * X_ww + k.P_F2 * X_ws + M_F * a_w,
+        M_1_w + (k.P_11 * X_ws + k.P_12 * X_ss + M_1 * a_s) / 2,
+        M_2_w - (k.P_21 * X_ws + k.P_22 * X_ss + M_2 * a_s) / 2, M_1_w, M_2_w, T_3_w3)
+    return (T_3_w3, T_1 * (a_w + a_s / 2), T_2 * (a_w - a_s / 2), energy_gained(m, start, end),
+            *lost, 0.0)
 
 
 class SymmetricMeter:
-    """The books of a symmetric differential, exact: its path is that of a linear equation."""
+    """The books of a symmetric differential under the paper's law, exact."""
 
     def __init__(self, model):
         p, self._h = model.parameters, model.h
         self._m = kinetic_form((p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s),
-                               symmetric.kinematics(p))
-        self._g_F, self._moments = p.g_F, model.moments
-        self._losses = {d: losses.symmetric_losses(p, d) for d in model.responses}
-        self._second = {d: tuple(second_moment_of_the_way(r.A, model.h).ravel().tolist())
-                        for d, r in model.responses.items()}
+                               symmetric.kinematics(p) @ np.linalg.inv(TO_SLIP))
+        self._g_F, self._linear = p.g_F, {}
+        for direction, r in model.responses.items():
+            from_slip = np.linalg.inv(TO_SLIP)
+            moments = symmetric.Moments(*np.hstack([r.P @ from_slip, r.Q]).ravel().tolist())
+            self._linear[direction] = (
+                second_moment_of_the_way(TO_SLIP @ r.A @ from_slip, model.h), moments,
+                losses.symmetric_losses(p, direction))
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
-        return kinetic_energy(self._m, x)
+        return kinetic_energy(self._m, in_slip(x))
 
     def book(self, step, T):
         """Return the energies of a step, see the module."""
-        x, direction, end, (a_1, a_2), _, _, _ = step
-        (x_1, x_2), (y_1, y_2), (T_3, T_1, T_2), h = x, end, T, self._h
-        k_11, k_12, k_13, k_21, k_22, k_23, k_31, k_32, k_33 = self._second[direction]
-        # the integral of x x'
-        d_1, d_2 = y_1 - x_1, y_2 - x_2
-        d_11, d_12, d_22 = d_1 * d_1, d_1 * d_2, d_2 * d_2
-        b_1, b_2 = a_1 - h * x_1, a_2 - h * x_2
-        X_11 = x_1 * (a_1 + b_1) + k_11 * d_11 + k_12 * d_12 + k_13 * d_22
-        X_12 = x_1 * a_2 + x_2 * b_1 + k_21 * d_11 + k_22 * d_12 + k_23 * d_22
-        X_22 = x_2 * (a_2 + b_2) + k_31 * d_11 + k_32 * d_12 + k_33 * d_22
-        X_01, X_02, a_0 = (X_11 + X_12) / 2, (X_12 + X_22) / 2, (a_1 + a_2) / 2
-        # of moments and speeds: M = P x + Q T, in one sign for both directions
-        k = self._moments[direction]
-        M_F = k.Q_F3 * T_3 + k.Q_F1 * T_1 + k.Q_F2 * T_2
-        M_1 = k.Q_13 * T_3 + k.Q_11 * T_1 + k.Q_12 * T_2
-        M_2 = k.Q_23 * T_3 + k.Q_21 * T_1 + k.Q_22 * T_2
-        T_3_w3 = T_3 * self._g_F * a_0
-        lost = losses.symmetric(
-            self._losses[direction], (X_01 + X_02) / 2, (X_11 - X_22) / 2, X_11 + X_22 - 2 * X_12,
-            direction * (k.P_F1 * X_01 + k.P_F2 * X_02 + M_F * a_0),
-            direction * (k.P_11 * X_11 + k.P_12 * X_12 + M_1 * a_1),
-            direction * (k.P_21 * X_12 + k.P_22 * X_22 + M_2 * a_2),
-            direction * (k.P_11 * X_01 + k.P_12 * X_02 + M_1 * a_0),
-            direction * (k.P_21 * X_01 + k.P_22 * X_02 + M_2 * a_0), T_3_w3)
-        return T_3_w3, T_1 * a_1, T_2 * a_2, energy_gained(self._m, x, end), *lost, 0.0
+        x, direction, end, integral, _, _, _ = step
+        return linear_book(*self._linear[direction], self._m, self._g_F, self._h, in_slip(x),
+                           in_slip(end), in_slip(integral), T)
 
 
-def lobatto(pieces):
-    """
-    Return Lobatto's rule of five points on [0, 1] in pieces, each as long as all before it.
-
-    What vanishes at 0 is integrated exactly to degree 7 in each piece.
-
-    :return: ``(r, r^2, r^3, weight)`` of each node r in (0, 1), 1/2 first, and the weight at 1.
-    """
-    inner = (3 / 7)**0.5 / 2
-    rule = ((0.0, 1 / 20), (0.5 - inner, 49 / 180), (0.5, 16 / 45), (0.5 + inner, 49 / 180),
-            (1.0, 1 / 20))
-    edges = [0.0] + [2.0**(n + 1 - pieces) for n in range(pieces)]
-    weights = {0.5: 0.0}
-    for begin, end in zip(edges, edges[1:]):
-        for node, weight in rule:
-            at = begin + (end - begin) * node
-            weights[at] = weights.get(at, 0.0) + (end - begin) * weight
-    del weights[0.0]
-    last = weights.pop(1.0)
-    return tuple((r, r**2, r**3, weight) for r, weight in weights.items()), last
+def in_slip(x):
+    """Return (omega_0, slip) from (omega_1, omega_2)."""
+    x_1, x_2 = x
+    return (x_1 + x_2) / 2, x_1 - x_2
 
 
 class SelfLockingMeter:
     """
-    The books of a self-locking differential, along the path of ``clutch.step``.
+    The books of a self-locking differential, along the path of ``adaptive.step``.
 
     In a part of that path the friction is its tangent at the start and a remainder, which is as
     small as what the step calls its error: Simpson's rule will do for it. The rest is linear, and
@@ -155,8 +131,6 @@ class SelfLockingMeter:
     remainder and on c; the work of it is what the error of the step takes.
     """
 
-    RULES = (None, *(lobatto(pieces) for pieces in range(1, 41)))
-    STIFF = 1.5   # time constants of the path that a piece may take
     CALM = 4e-6   # rad/s of c: with less, the remainder is some hundredth of the step's tolerance
 
     def __init__(self, model):
@@ -187,17 +161,13 @@ class SelfLockingMeter:
 
     def _part(self, k, q, u, T_0, part):
         """Return what the elements lost in a part of the path, and what its error took."""
-        (w, s), f, J, h, (d_w, d_s), (c_w, c_s), (a_w, a_s), straight, here, there = part
-        J_ww, J_ws, J_sw, J_ss, F_1w, F_1s, F_2w, F_2s = J
+        (w, s), f, J, F, h, (d_w, d_s), (c_w, c_s), (a_w, a_s), straight, here, there = part
+        (J_ww, J_ws, J_sw, J_ss), (F_1w, F_1s, F_2w, F_2s) = J, F
         v_w, v_s, F_1, F_2, _, _, _, _, _, _ = here
         m_ww, m_ws, m_ss = self._m
         J_path = (0.0, 0.0, 0.0, 0.0) if straight else (J_ww, J_ws, J_sw, J_ss)
-        stiff = h * (abs(J_path[0]) + abs(J_path[3]))
-        pieces = 1
-        while stiff > self.STIFF:
-            stiff /= 2.0
-            pieces += 1
-        inner, end = self.RULES[min(pieces, len(self.RULES) - 1)]
+        # the way vanishes at the start
+        inner, _, end = rule_for(J_path, h, leads_far(w, s, d_w, d_s))
         ways = way(J_path, f, h, inner)
 
         # moments over the path of the way y(t) - y: of two of it, and of it and powers of t/h
@@ -275,9 +245,83 @@ class SelfLockingMeter:
             T_0 * a_w), -taken
 
 
-METERS = {SYMMETRIC.name: SymmetricMeter, SELF_LOCKING.name: SelfLockingMeter}
+class PassiveMeter:
+    """
+    The books of a differential under the passive law: no loss in them is ever negative.
+
+    An exact step is linear. Along the parts of an adaptive one the lost powers are integrated as
+    they are, and so is the work of y' - f(y), which is what the error of the step takes. The
+    last resort has all losses at its end; what it takes beside them is the energy of its jump.
+    """
+
+    def __init__(self, model):
+        p, self._h = model.parameters, model.h
+        self._k, self._with_final_drive = model.k, bool(model.k.g_F)
+        if self._with_final_drive:
+            shafts = symmetric.kinematics(p) @ np.linalg.inv(TO_SLIP)
+            inertias = p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s
+        else:
+            shafts = self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p))
+            inertias = p.I_0, p.I_1, p.I_2, p.n_s * p.I_s
+        self._m = kinetic_form(inertias, shafts)
+
+    def stored_energy(self, x):
+        """Return the kinetic energy at the speeds x, J."""
+        return kinetic_energy(self._m, x)
+
+    def book(self, step, T):
+        """Return the energies of a step, see the module."""
+        x, _, end, integral, _, _, path = step
+        k = self._k
+        if type(path) is Pattern:
+            return linear_book(path.second, path.moments, path.losses, self._m, k.g_F, self._h, x,
+                               end, integral, T)
+        u, parts = path
+        lost = numerical = None
+        for part in parts:
+            more, taken = self._part(u, part)
+            if lost is None:
+                lost, numerical = more, taken
+            else:
+                lost, numerical = tuple(map(add, lost, more)), numerical + taken
+        drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0, clutch_1, clutch_2 = lost
+        lost = ((drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0)
+                if self._with_final_drive else
+                (drag, mesh_1, mesh_2, bearing_0, clutch_1, clutch_2))
+        (T_in, T_1, T_2), (a_w, a_s) = T, integral
+        return (T_in * (k.g_F or 1.0) * a_w, T_1 * (a_w + k.k_1 * a_s), T_2 * (a_w - k.k_2 * a_s),
+                energy_gained(self._m, x, end), *lost, numerical)
+
+    def _part(self, u, part):
+        """Return what the elements lost in a part of the path, and what its error took."""
+        k, (m_ww, m_ws, m_ss) = self._k, self._m
+        (w_0, s_0), f, J, _, h, (d_w, d_s), (c_w, c_s), _, straight, here, there = part
+        if straight:
+            jump = kinetic_energy(self._m, (d_w, d_s))
+            return tuple([h * loss for loss in passive.lost_powers(k, u, there)]), jump
+        (f_w, f_s), (J_ww, J_ws, J_sw, J_ss) = f, J
+        inner, begin, end = rule_for(J, h, leads_far(w_0, s_0, d_w, d_s))
+        w, s = w_0 + d_w + c_w, s_0 + d_s + c_s
+        # at the start the path obeys the equations
+        error_w = f_w + J_ww * d_w + J_ws * d_s + 3 * c_w / h - there[0]
+        error_s = f_s + J_sw * d_w + J_ss * d_s + 3 * c_s / h - there[1]
+        taken = end * ((m_ww * w + m_ws * s) * error_w + (m_ws * w + m_ss * s) * error_s)
+        lost = [begin * a + end * b for a, b in zip(passive.lost_powers(k, u, here),
+                                                    passive.lost_powers(k, u, there))]
+        for (_, r_2, r_3, weight), (q_w, q_s) in zip(inner, way(J, f, h, inner)):
+            w, s = w_0 + q_w + c_w * r_3, s_0 + q_s + c_s * r_3
+            point = passive.evaluate(k, u, w, s)
+            error_w = f_w + J_ww * q_w + J_ws * q_s + 3 * c_w * r_2 / h - point[0]
+            error_s = f_s + J_sw * q_w + J_ss * q_s + 3 * c_s * r_2 / h - point[1]
+            taken += weight * ((m_ww * w + m_ws * s) * error_w + (m_ws * w + m_ss * s) * error_s)
+            lost = [a + weight * b for a, b in zip(lost, passive.lost_powers(k, u, point))]
+        return tuple([h * loss for loss in lost]), -h * taken
 
 
-def meter_of(mechanism, model):
-    """Return the meter that reads what a model of a mechanism did."""
-    return METERS[mechanism.name](model)
+METERS = {SymmetricModel: SymmetricMeter, SelfLockingModel: SelfLockingMeter,
+          PassiveModel: PassiveMeter, PassiveSymmetricModel: PassiveMeter}
+
+
+def meter_of(model):
+    """Return the meter that reads what a model did."""
+    return METERS[type(model)](model)

@@ -5,22 +5,26 @@
 One variant with one set of parameters and one step length: equations and stepper together.
 
 A model is immutable and holds no state, so that it can be exchanged for another between two
-steps. What it needs of a ``State`` is handed in: the speeds x, the torques T, the direction and,
-for the friction of ``lsd_lagged``, the memory. ``step`` returns what it did, a tuple
+steps. What it needs of a ``State`` is handed in: the speeds x, the torques T, the power flow
+and, for the friction of ``lsd_lagged``, the memory. ``step`` returns what it did, a tuple
 
-    (x, direction, end, integral, point, coarse, path)
+    (x, flow, end, integral, point, coarse, path)
 
 from the speeds at the start to those at the end, with their integral over the step. ``point`` is
-what was evaluated at the end and saves doing so again for the moments, or None; ``path`` is
-``(u, parts)`` of ``clutch.step``, or None where start and end tell it.
+what is known at the end and saves finding it again for the moments, or None; ``path`` tells the
+way between: the ``Pattern`` of an exact step, ``(u, parts)`` of ``adaptive.step``, or None where
+the flow tells it.
 """
 
 import numpy as np
 
-from dm_ros.mechanism import clutched, symmetric
-from dm_ros.mechanism.power_flow import DIRECT, REVERSE
+from dm_ros.mechanism import clutched, passive, symmetric
+from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
 from dm_ros.mechanism.variants import SELF_LOCKING, SYMMETRIC
-from dm_ros.motion import clutch, held_torque
+from dm_ros.motion import adaptive, held_torque
+from dm_ros.motion.patterns import exact_step, Pattern, Patterns
+
+PASSIVE, PAPER = LOSS_LAWS = 'passive', 'paper'
 
 
 def responses_of(formulation, parameters):
@@ -38,7 +42,7 @@ def responses_of(formulation, parameters):
 
 
 class SymmetricModel:
-    """A symmetric differential; x is (omega_1, omega_2)."""
+    """A symmetric differential under the paper's law; x is (omega_1, omega_2)."""
 
     lagged = False
 
@@ -48,7 +52,7 @@ class SymmetricModel:
         self._g_F, self._g_2s = parameters.g_F, parameters.g_2s
         self._step, self.moments = {}, {}
         for direction, response in self.responses.items():
-            self._step[direction] = held_torque.held_torque_step(response, h)
+            self._step[direction] = held_torque.held_torque_step(response.A, response.B, h)
             # M in one sign for both directions
             rows = direction * np.hstack([response.P, response.Q])
             self.moments[direction] = symmetric.Moments(*rows.ravel().tolist())
@@ -63,11 +67,12 @@ class SymmetricModel:
         x_0 = (x_1 + x_2) / 2
         return x_0, x_1, x_2, self._g_F * x_0, (x_2 - x_1) / (2 * self._g_2s)
 
-    def powers(self, x, T):
-        """Return the power of the input shaft and the sum of the output shafts, W."""
+    def flow(self, x, T, deadband, last):
+        """Return the power-flow index, (35)-(36)."""
         x_1, x_2 = x
         T_3, T_1, T_2 = T
-        return T_3 * self._g_F * (x_1 + x_2) / 2, T_1 * x_1 + T_2 * x_2
+        return power_flow(T_3 * self._g_F * (x_1 + x_2) / 2, T_1 * x_1 + T_2 * x_2, deadband,
+                          last)
 
     def step(self, x, memory, T, direction):
         """Advance by h; see the module for what is returned."""
@@ -83,7 +88,7 @@ class SymmetricModel:
 
 
 class SelfLockingModel:
-    """A self-locking differential; x is (omega_0, omega_1 - omega_2)."""
+    """A self-locking differential under the paper's law; x is (omega_0, omega_1 - omega_2)."""
 
     def __init__(self, formulation, parameters, h):
         self.parameters, self.h = parameters, h
@@ -92,7 +97,7 @@ class SelfLockingModel:
         self._g_12, self._g_2s = parameters.g_12, parameters.g_2s
         self._phi, self._preload = clutched.full_friction(parameters)
         # |M| of the last step feeds the friction of the next, which amplifies errors
-        self._tolerance = clutch.TOLERANCE / 5 if self.lagged else clutch.TOLERANCE
+        self._tolerance = adaptive.TOLERANCE / 5 if self.lagged else adaptive.TOLERANCE
         self.coefficients = {
             direction: clutched.coefficients(parameters, response, not self.lagged)
             for direction, response in self.responses.items()}
@@ -107,17 +112,18 @@ class SelfLockingModel:
         g = 1 + self._g_12
         return x_0, x_0 + self._g_12 / g * slip, x_0 - slip / g, (0.0 - slip) / (self._g_2s * g)
 
-    def powers(self, x, T):
-        """Return the power of the input shaft and the sum of the output shafts, W."""
+    def flow(self, x, T, deadband, last):
+        """Return the power-flow index, (35)-(36)."""
         x_0, x_1, x_2, _ = self.all_shafts(x)
         T_0, T_1, T_2 = T
-        return T_0 * x_0, T_1 * x_1 + T_2 * x_2
+        return power_flow(T_0 * x_0, T_1 * x_1 + T_2 * x_2, deadband, last)
 
     def step(self, x, memory, T, direction):
         """Advance by h; see the module for what is returned."""
         k = self.coefficients[direction]
         u = clutched.held(k, T, self._friction(memory))
-        end, integral, point, coarse, parts = clutch.step(k, u, x, self.h, self._tolerance)
+        end, integral, point, coarse, parts = adaptive.step(
+            adaptive.PAPER, k, u, x, self.h, self._tolerance)
         return x, direction, end, integral, point, coarse, (u, parts)
 
     def point(self, x, memory, T, direction):
@@ -144,9 +150,114 @@ class SelfLockingModel:
         return phi_1 * M_1 + S_1, phi_2 * M_2 + S_2
 
 
-MODELS = {SYMMETRIC.name: SymmetricModel, SELF_LOCKING.name: SelfLockingModel}
+class PassiveModel:
+    """A differential under the passive law; x is (omega_0, omega_1 - omega_2)."""
+
+    def __init__(self, formulation, parameters, h, mechanism):
+        self.parameters, self.h = parameters, h
+        self.lagged = getattr(formulation, 'lagged', False)
+        responses_of(formulation, parameters)   # refuses what overflows
+        clutches = bool(mechanism.clutches)
+        self.k = passive.coefficients(parameters, clutches, not self.lagged)
+        self._phi, self._preload = (clutched.full_friction(parameters) if clutches
+                                    else ((0.0, 0.0), (0.0, 0.0)))
+        self._driven = not self.k.g_F
+        self._g_2s = parameters.g_2s
+        self._tolerance = adaptive.TOLERANCE / 5 if self.lagged else adaptive.TOLERANCE
+
+    def independent(self, omega_1, omega_2):
+        """Return x for the given speeds of the output shafts."""
+        return (omega_1 + self.k.g_12 * omega_2) / (1 + self.k.g_12), omega_1 - omega_2
+
+    def all_shafts(self, x):
+        """Return the speeds of all shafts from x, or their angles from its integral."""
+        x_0, slip = x
+        k = self.k
+        spin = (0.0 - slip) * k.k_2 / self._g_2s
+        if k.g_F:
+            return x_0, x_0 + k.k_1 * slip, x_0 - k.k_2 * slip, k.g_F * x_0, spin
+        return x_0, x_0 + k.k_1 * slip, x_0 - k.k_2 * slip, spin
+
+    def flow(self, x, T, deadband, last):
+        """Return who drives, +1 for the input shaft; nothing depends on it."""
+        k, (w, _) = self.k, x
+        return who_drives(T[0] * (k.g_F or 1.0) * w, abs(w) > k.sign_speed, deadband, last)
+
+    def step(self, x, memory, T, flow):
+        """Advance by h; see the module for what is returned."""
+        u = passive.held(T, self._friction(memory))
+        return self._adaptive_step(x, u, flow)
+
+    def point(self, x, memory, T, flow):
+        """Return the point at a state, see ``passive``."""
+        return passive.evaluate(self.k, passive.held(T, self._friction(memory)), *x)
+
+    def internal_moments(self, x, T, flow, point):
+        """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
+        _, _, F_1, F_2, M_1, M_2, *_ = point
+        return M_1, M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
+
+    def remembered(self, point):
+        """Return the |M| that the friction of the next step of ``lsd_lagged`` knows."""
+        _, _, _, _, M_1, M_2, *_ = point
+        return abs(M_1), abs(M_2)
+
+    def _adaptive_step(self, x, u, flow):
+        end, integral, point, coarse, parts = adaptive.step(
+            adaptive.PASSIVE, self.k, u, x, self.h, self._tolerance)
+        return x, flow, end, integral, point, coarse, (u, parts)
+
+    def _friction(self, memory):
+        """Return the friction at full slip that does not follow M in the step, N m."""
+        if not self.lagged:
+            return self._preload
+        (phi_1, phi_2), (S_1, S_2), (M_1, M_2) = self._phi, self._preload, memory
+        return phi_1 * M_1 + S_1, phi_2 * M_2 + S_2
 
 
-def model_of(variant, parameters, h):
-    """Return the model of a ``Variant`` with parameters and a step of h, s."""
-    return MODELS[variant.mechanism.name](variant.formulation, parameters, h)
+class PassiveSymmetricModel(PassiveModel):
+    """A symmetric differential under the passive law: exact steps while no sign changes."""
+
+    def __init__(self, formulation, parameters, h, mechanism):
+        super().__init__(formulation, parameters, h, mechanism)
+        self._patterns = Patterns(formulation(parameters), parameters, self.k, h)
+        self._guess = None   # the pattern met last: where it fits, it is the one
+
+    def step(self, x, memory, T, flow):
+        """Advance by h; see the module for what is returned."""
+        guess = self._guess
+        done = guess and exact_step(guess, x, T)
+        if not done:
+            u = passive.held(T, self._preload)
+            pattern = self._patterns.at(u, passive.evaluate(self.k, u, *x))
+            done = pattern and pattern is not guess and exact_step(pattern, x, T)
+            self._guess = guess = pattern or guess
+        if done:
+            end, integral = done
+            return x, flow, end, integral, guess, False, guess
+        x, flow, end, integral, point, coarse, path = self._adaptive_step(x, u, flow)
+        return x, flow, end, integral, self._patterns.at(u, point) or point, coarse, path
+
+    def point(self, x, memory, T, flow):
+        """Return the pattern at a state, or its point where there is none."""
+        u = passive.held(T, self._preload)
+        point = passive.evaluate(self.k, u, *x)
+        return self._patterns.at(u, point) or point
+
+    def internal_moments(self, x, T, flow, point):
+        """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
+        if type(point) is Pattern:
+            return symmetric.moments(point.moments, x, T)
+        return point[6] + 0.0, point[4] + 0.0, point[5] + 0.0
+
+
+PAPER_MODELS = {SYMMETRIC.name: SymmetricModel, SELF_LOCKING.name: SelfLockingModel}
+
+
+def model_of(variant, loss_law, parameters, h):
+    """Return the model of a ``Variant`` under a law of losses, with a step of h, s."""
+    formulation, mechanism = variant.formulation, variant.mechanism
+    if loss_law == PAPER:
+        return PAPER_MODELS[mechanism.name](formulation, parameters, h)
+    kind = PassiveModel if mechanism.clutches else PassiveSymmetricModel
+    return kind(formulation, parameters, h, mechanism)

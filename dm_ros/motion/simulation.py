@@ -10,9 +10,9 @@ Nothing here depends on measured time: equal inputs give equal bits.
 import math
 from operator import add
 
-from dm_ros.mechanism.power_flow import DIRECT, power_flow
+from dm_ros.mechanism.power_flow import DIRECT
 from dm_ros.mechanism.variants import variant_named
-from dm_ros.motion.models import model_of
+from dm_ros.motion.models import LOSS_LAWS, model_of, PASSIVE
 from dm_ros.motion.state import Snapshot, State
 
 
@@ -27,15 +27,19 @@ class Simulation:
     :param dt: length of a tick, s.
     :param parameters: ``SymmetricParameters`` or ``SelfLockingParameters``, or a mapping from
         parameter names to values that differ from the defaults.
+    :param loss_law: 'passive', where no element ever gives energy back, or 'paper'.
     :param substeps: solver steps in a tick.
     :param power_flow_deadband: W, see ``dm_ros.mechanism.power_flow``.
     :param initial_velocity: speeds of the two output shafts at the start, rad/s.
     :raises ValueError: names what is wrong, its value and what is allowed.
     """
 
-    def __init__(self, variant, dt=0.001, parameters=None, *, substeps=1,
+    def __init__(self, variant, dt=0.001, parameters=None, *, loss_law=PASSIVE, substeps=1,
                  power_flow_deadband=0.0, initial_velocity=(0.0, 0.0)):
         self._variant = variant_named(variant)
+        if loss_law not in LOSS_LAWS:
+            raise ValueError(f'loss_law: {loss_law!r} is not one of {", ".join(LOSS_LAWS)}')
+        self.loss_law = loss_law
         self.mechanism = self._variant.mechanism
         self.dt = checked('dt', dt, lambda v: v > 0.0, 'a positive number of seconds')
         self.power_flow_deadband = power_flow_deadband
@@ -139,14 +143,14 @@ class Simulation:
         """
         The ``State``, all that goes on from tick to tick but their number.
 
-        One that a simulation of the same variant and parameters had may be put back.
+        One that a simulation of the same variant, law and parameters had may be put back.
         """
-        return State(self._x, self._turned, self._origin, self._torque, self._direction,
+        return State(self._x, self._turned, self._origin, self._torque, self._flow,
                      self._memory)
 
     @state.setter
     def state(self, state):
-        (self._x, self._turned, self._origin, self._torque, self._direction,
+        (self._x, self._turned, self._origin, self._torque, self._flow,
          self._memory) = state
         self._point = None
 
@@ -171,7 +175,8 @@ class Simulation:
                                  f'{kind.__name__} or a mapping') from None
         substeps = checked('substeps', self._substeps if substeps is None else substeps,
                            lambda v: v >= 1 and v == int(v), 'a positive integer')
-        return model_of(self._variant, parameters, self.dt / substeps), int(substeps)
+        return (model_of(self._variant, self.loss_law, parameters, self.dt / substeps),
+                int(substeps))
 
     def adopt(self, prepared):
         """Take what ``prepare`` made; the speeds of the output shafts and all angles go on."""
@@ -209,20 +214,19 @@ class Simulation:
         """
         T = self._checked_torques(torques)
         model, deadband = self._model, self._deadband
-        x, memory, direction = self._x, self._memory, self._direction
+        x, memory, flow = self._x, self._memory, self._flow
         lagged, point = model.lagged, self._point
         if lagged and point is None:
-            point = model.point(x, memory, self._torque, direction)
+            point = model.point(x, memory, self._torque, flow)
         turned_1, turned_2 = self._turned
         coarse_steps = 0
         steps = []
         try:
             for _ in range(self._substeps):
-                input_power, output_power = model.powers(x, T)
-                direction = power_flow(input_power, output_power, deadband, direction)
+                flow = model.flow(x, T, deadband, flow)
                 if lagged:
                     memory = model.remembered(point)
-                step = model.step(x, memory, T, direction)
+                step = model.step(x, memory, T, flow)
                 _, _, x, (angle_1, angle_2), point, coarse, _ = step
                 turned_1 += angle_1
                 turned_2 += angle_2
@@ -234,7 +238,7 @@ class Simulation:
         if not in_range:
             raise ValueError(f'torques: {T} lead out of the range of floating point numbers')
         self._x, self._turned, self._torque = x, (turned_1, turned_2), T
-        self._direction, self._memory, self._point = direction, memory, point
+        self._flow, self._memory, self._point = flow, memory, point
         self._coarse_steps += coarse_steps
         self._ticks += 1
         return steps
@@ -244,11 +248,11 @@ class Simulation:
         return Snapshot(*self._report())
 
     def _report(self):
-        model, x, T, direction = self._model, self._x, self._torque, self._direction
+        model, x, T, flow = self._model, self._x, self._torque, self._flow
         if self._point is None:
-            self._point = model.point(x, self._memory, T, direction)
+            self._point = model.point(x, self._memory, T, flow)
         return (self._ticks * self.dt, model.all_shafts(x), self._positions(model), T,
-                model.internal_moments(x, T, direction, self._point), direction)
+                model.internal_moments(x, T, flow, self._point), flow)
 
     def _positions(self, model):
         return tuple(map(add, self._origin, model.all_shafts(self._turned)))

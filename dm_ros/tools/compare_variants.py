@@ -5,6 +5,7 @@
 
 import argparse
 from io import BytesIO
+from math import inf
 import os
 import sys
 
@@ -14,9 +15,11 @@ from dm_ros.files.plot import require_matplotlib
 from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import MECHANISMS, SELF_LOCKING, SYMMETRIC
 from dm_ros.motion.simulation import checked
+from dm_ros.tools.comparison import laws
 from dm_ros.tools.comparison.claims import symmetric_claims
 from dm_ros.tools.comparison.claims_lsd import self_locking_claims
 from dm_ros.tools.comparison.figures import FIGURES
+from dm_ros.tools.comparison.laws_page import laws_page, picture, picture_name
 from dm_ros.tools.comparison.page import page
 from dm_ros.tools.comparison.runs import (
     BUILT_IN_SECONDS,
@@ -28,14 +31,16 @@ from dm_ros.tools.ending import run_tool
 from dm_ros.tools.progress import progress
 
 TABLE_SECONDS = 30.0   # of a CSV, without --duration
-PAGE = 'index.html'
+PAGE, LAWS_PAGE = 'index.html', 'laws.html'
 CLAIMS = {SYMMETRIC: symmetric_claims, SELF_LOCKING: self_locking_claims}
 EPILOG = """\
 The page shows, for each mechanism, what each variant is, gives and costs, how far it is from the
 exact solution at 100 Hz, 1 kHz and 10 kHz, what the paper says in words beside what is measured
-here, and the paper's figures 3, 4, 7 and 8 drawn from these runs. DIR gets index.html, which holds
-all pictures and can be passed on alone, and each picture as PNG beside it. All numbers but the
-timings are the same in each run. It takes about half a minute.
+here, and the paper's figures 3, 4, 7 and 8 drawn from these runs, all under the loss law "paper".
+A second page has both loss laws side by side: where the energy goes on the same load, on a drive
+cycle and on balanced loads. DIR gets index.html and laws.html, which hold all pictures and can be
+passed on alone, and each picture as PNG beside them. All numbers but the timings are the same in
+each run. It takes about a minute.
 
 IN.csv is that of "simulate": a header "time,<shaft>,..." with the input shafts (symmetric: pinion,
 left, right; lsd: carrier, front, rear), rows of s and N m that hold until the next row's time; the
@@ -82,6 +87,13 @@ def loads(arguments):
     return {mechanism: Load(mechanism, used, table)}, f'The load is {arguments.torques}{part}.'
 
 
+def png(figure):
+    """Return a figure as the bytes of a PNG file."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format='png')
+    return buffer.getvalue()
+
+
 def compare(arguments):
     """Do what the command line says; raise ValueError or OSError where it cannot be done."""
     require_matplotlib()
@@ -92,23 +104,27 @@ def compare(arguments):
     if arguments.params:
         source += f' The parameters come from {arguments.params}.'
     files = {}
-    comparisons = []
-    with progress(total=sum(ticks_of(m, load) for m, load in chosen.items())) as bar:
+    comparisons, both_laws = [], []
+    longest = inf if arguments.duration is None else arguments.duration
+    with progress(total=sum(ticks_of(m, load) + laws.ticks_of(load, longest)
+                            for m, load in chosen.items())) as bar:
         for mechanism, load in chosen.items():
             try:
                 runs = run(mechanism, load, values, bar.update)
+                outcomes = laws.run(mechanism, load, values, bar.update, longest)
             except ValueError as error:
                 raise ValueError(f'{arguments.torques}: {error}' if arguments.torques
                                  else error) from None
             images = {}
             for name, (which, draw, _) in FIGURES.items():
                 if which is mechanism:
-                    picture = BytesIO()
-                    draw(runs).savefig(picture, format='png')
-                    images[name] = picture.getvalue()
-            files.update(images)
+                    images[name] = png(draw(runs))
+            image = png(picture(mechanism, outcomes))
+            both_laws.append((mechanism, outcomes, image))
+            files |= {**images, picture_name(mechanism): image}
             comparisons.append((runs, CLAIMS[mechanism](runs), images))
     files[PAGE] = page(comparisons, source).encode()
+    files[LAWS_PAGE] = laws_page(both_laws, source).encode()
     os.makedirs(arguments.out, exist_ok=True)
     for name, content in files.items():
         with replacing(os.path.join(arguments.out, name), 'wb') as file:

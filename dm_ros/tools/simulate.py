@@ -19,6 +19,7 @@ from dm_ros.files.plot import require_matplotlib
 from dm_ros.files.record import Record
 from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import VARIANTS
+from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.settings import make_simulation, NodeParameters
 from dm_ros.tools.ending import run_tool
 from dm_ros.tools.progress import progress
@@ -34,8 +35,8 @@ OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), 
 (N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse): a row for the start, then one for
 the end of each tick. Without --out and --plot it goes to stdout.
 
-Of FILE, a ROS 2 parameter file, these count: the parameters of the mechanism, rate, substeps,
-power_flow_deadband and initial_velocity.
+Of FILE, a ROS 2 parameter file, these count: the parameters of the mechanism, loss_law, rate,
+substeps, power_flow_deadband and initial_velocity.
 """
 
 
@@ -45,6 +46,9 @@ def parser():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     result.add_argument('--variant', required=True, choices=VARIANTS,
                         help='the mechanism and its formulation')
+    result.add_argument('--loss-law', choices=LOSS_LAWS,
+                        help='what gears and bearings lose; default: loss_law of FILE, '
+                        f'else {NodeParameters().loss_law}')
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
     result.add_argument('--torques', metavar='IN.csv', required=True, help='torques over time')
     result.add_argument('--dt', type=float, metavar='S',
@@ -78,6 +82,8 @@ def run(arguments):
     if len(set(files)) < len(files):
         raise ValueError(f'{max(files, key=files.count)}: given for two files')
     values = read_parameter_file(arguments.params) if arguments.params else {}
+    if arguments.loss_law:
+        values['loss_law'] = arguments.loss_law
     simulation = make_simulation(arguments.variant, values, arguments.dt)
     table = read_torque_file(arguments.torques, simulation.inputs)
     try:

@@ -3,7 +3,6 @@
 
 """The page of the comparison: one HTML file that holds all it shows."""
 
-from base64 import b64encode
 from html import escape
 import os
 import platform
@@ -14,6 +13,7 @@ import scipy
 from dm_ros.mechanism.variants import CATALOGUE, SELF_LOCKING, SYMMETRIC, variants_of
 from dm_ros.tools.comparison.claims import FOUND, OTHERWISE, PARTLY, SILENT
 from dm_ros.tools.comparison.figures import FIGURES
+from dm_ros.tools.comparison.markup import code, document, figure, table
 from dm_ros.tools.comparison.measures import difference
 from dm_ros.tools.comparison.runs import PASSES, RATE, RATES, TIMED_TICKS
 
@@ -29,43 +29,7 @@ GIVEN = {   # what a solution of a variant holds, and what must be computed from
 }
 TITLES = {SYMMETRIC: 'Symmetric differential with final drive',
           SELF_LOCKING: 'Asymmetric self-locking differential'}
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 1100px;
-       margin: 2em auto; padding: 0 1em; }
-h1 { line-height: 1.2; } h2 { margin-top: 2.2em; border-bottom: 2px solid #222; }
-table { border-collapse: collapse; margin: 1em 0; font-size: 14.5px; line-height: 1.35; }
-th, td { text-align: left; vertical-align: top; padding: .4em .8em .4em 0;
-         border-bottom: 1px solid #ddd; }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-tr.new td { border-top: 2px solid #aaa; }
-code { font-size: 92%; white-space: nowrap; }
-.natures td:nth-child(-n+4) { white-space: nowrap; }
-figure { margin: 2em 0; } figure img { width: 100%; height: auto; }
-figcaption { color: #444; font-size: 15px; }
-.v { white-space: nowrap; font-weight: 600; }
-.found { color: #1b7a34; } .part { color: #9a6400; }
-.not { color: #b3261e; } .silent { color: #666; }
-"""
 VERDICT_CLASSES = {FOUND: 'found', PARTLY: 'part', OTHERWISE: 'not', SILENT: 'silent'}
-
-
-def table(head, rows, numbers=(), kind='plain'):
-    """Return a table; cells are HTML; a row that begins anew is marked by None before it."""
-    def cells(tag, row):
-        return ''.join(f'<{tag} class="n">{cell}</{tag}>' if n in numbers else
-                       f'<{tag}>{cell}</{tag}>' for n, cell in enumerate(row))
-    lines, new = [f'<tr>{cells("th", head)}</tr>'], ''
-    for row in rows:
-        if row is None:
-            new = ' class="new"'
-        else:
-            lines.append(f'<tr{new}>{cells("td", row)}</tr>')
-            new = ''
-    return f'<table class="{kind}">\n' + '\n'.join(lines) + '\n</table>\n'
-
-
-def code(text):
-    return f'<code>{escape(text)}</code>'
 
 
 def judgement(runs):
@@ -107,12 +71,6 @@ def words(found):
         [claim.section, escape(claim.paper), escape(claim.here),
          f'<span class="v {VERDICT_CLASSES[claim.verdict]}">{claim.verdict}</span>']
         for claim in found])
-
-
-def figure(name, image, caption):
-    return (f'<figure id="{name.removesuffix(".png")}"><a href="{name}"><img alt="{name}" '
-            f'src="data:image/png;base64,{b64encode(image).decode()}"></a>\n'
-            f'<figcaption>{escape(" ".join(caption.split()))}</figcaption></figure>\n')
 
 
 def differing(runs):
@@ -166,7 +124,9 @@ def page(comparisons, source):
     parts = ['<h1>The variants of two differentials, compared</h1>\n',
              f'<p>All variants of a mechanism on the same load, beside the exact solution and '
              f'beside the paper that they come from. {escape(source)} How it was measured is '
-             'told <a href="#method">at the end</a>.</p>\n']
+             'told <a href="#method">at the end</a>.</p>\n'
+             f'<p>All of this is under the law of losses {code("paper")}. How the default, '
+             f'{code("passive")}, differs is on <a href="laws.html">a page of its own</a>.</p>\n']
     for runs, found, images in comparisons:
         parts += [f'<h2 id="{runs.mechanism.name}">{TITLES[runs.mechanism]}</h2>\n',
                   f'<p>{runs.load.seconds:g} s of load; parameters: {differing(runs)}.</p>\n',
@@ -177,7 +137,4 @@ def page(comparisons, source):
         parts += [figure(name, image, FIGURES[name][2]) for name, image in images.items()]
     parts.append(METHOD.format(rate=RATE, passes=PASSES, ticks=TIMED_TICKS,
                                machine=escape(machine())))
-    return ('<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
-            '<meta name="viewport" content="width=device-width">\n'
-            f'<title>dm_ros: the variants compared</title>\n<style>{STYLE}</style></head>\n'
-            f'<body>\n{"".join(parts)}</body></html>\n')
+    return document('dm_ros: the variants compared', ''.join(parts))

@@ -4,7 +4,8 @@
 """
 The yardstick of the comparison: the exact solution under torques that are held within a tick.
 
-The power-flow index is decided at the start of each tick, from the yardstick's own speeds.
+The power-flow index is decided at the start of each tick, from the yardstick's own speeds; the
+law of losses is the paper's.
 """
 
 from typing import NamedTuple

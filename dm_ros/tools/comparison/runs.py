@@ -14,6 +14,7 @@ import numpy as np
 from dm_ros.files.columns import as_row
 from dm_ros.files.record import Record
 from dm_ros.mechanism.variants import Mechanism, SELF_LOCKING, SYMMETRIC, variants_of
+from dm_ros.motion.models import PAPER
 from dm_ros.settings import make_simulation, NodeParameters
 from dm_ros.tools.comparison.reference import exact_self_locking, exact_symmetric
 
@@ -89,13 +90,13 @@ def ticks_of(mechanism, load):
 
 def run(mechanism, load, values, tick):
     """
-    Run everything about one mechanism.
+    Run everything about one mechanism, under the paper's law of losses.
 
     :param values: ``{full name: value}``, as ``read_parameter_file`` returns them.
     :param tick: called with a number of ticks done.
     :raises ValueError: for a load that cannot be run.
     """
-    values = {**values, 'substeps': 1}
+    values = {**values, 'loss_law': PAPER, 'substeps': 1}
     deadband = NodeParameters().changed(NodeParameters.part_of(values)).deadband
     first, *_ = variants = variants_of(mechanism)
     lsd = mechanism is SELF_LOCKING
