@@ -8,6 +8,8 @@ DURATION = 10
 RATE = 200
 OUT = run
 PYTEST_ARGS =
+# a worker that has nothing left takes over half of what another still has
+PARALLEL = -n auto --dist worksteal
 BENCH_ARGS =
 COMPARE_ARGS =
 EXTRAS = ros,test
@@ -60,7 +62,7 @@ run: setup  ## run the demo: VARIANT, DURATION in s, RATE in Hz, OUT a folder
 
 test: setup  ## run the tests: PYTEST_ARGS
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \
-	  .venv/bin/python -m pytest -n auto $(PYTEST_ARGS)
+	  .venv/bin/python -m pytest $(PARALLEL) $(PYTEST_ARGS)
 
 compare: setup  ## compare all variants as the paper does, on a page in comparison/: COMPARE_ARGS
 	.venv/bin/compare_variants $(COMPARE_ARGS)
@@ -101,7 +103,8 @@ colcon: .venv/colcon  ## build the package with colcon, check what it installs, 
 	  --params-file install/dm_ros/share/dm_ros/config/lsd.yaml
 
 test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's numpy and scipy
-	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest -n auto --ignore=test/ros $(PYTEST_ARGS)
+	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest $(PARALLEL) --ignore=test/ros \
+	  $(PYTEST_ARGS)
 
 clean:  ## remove all that the other targets make
 	rm -rf .venv .venv-* build install log run comparison docs_build docs_output cross_reference \

@@ -57,6 +57,9 @@ int main(int argc, char **argv) {
   return 0;
 }
 """
+FLOOD = 10_000   # Hz
+BESIDE = {'setter': 'parameters set at 10 Hz',
+          'flood': f'a shaft flooded at up to {FLOOD:,} Hz'}
 LEGEND = """\
 `lateness` is how long after its deadline a tick begins. `missed` counts whole periods without a
 tick; `alone` those in a second in which the C loop, which ran at the same time, missed none, nor
@@ -233,8 +236,8 @@ def describe(name, rows, rate, reference, path, trips=None):
     return cells
 
 
-def run_rate(rate, arguments, folder, c_loop, with_setter=False):
-    """Return the rows of one rate."""
+def run_rate(rate, arguments, folder, c_loop, beside=None):
+    """Return the rows of one rate; beside: one of ``BESIDE`` that loads the node, or None."""
     me = [sys.executable, __file__]
     children = []
 
@@ -247,9 +250,12 @@ def run_rate(rate, arguments, folder, c_loop, with_setter=False):
         ('pinion', 'left') if arguments.variant.startswith('symmetric') else ('carrier', 'front'))
     child(*me, 'publisher', rate, input_shaft)
     child(*me, 'round_trips', output_shaft, 1, folder / 'trips')
-    if with_setter:
-        mechanism = 'symmetric' if input_shaft == 'pinion' else 'lsd'
+    mechanism, flooded = (('symmetric', 'right') if input_shaft == 'pinion'
+                          else ('lsd', 'rear'))
+    if beside == 'setter':
         child(*me, 'setter', f'{mechanism}.inertia.carrier')
+    if beside == 'flood':
+        child(*me, 'publisher', FLOOD, flooded)
     time.sleep(arguments.settle)
     timed = [child(*me, 'python_loop', rate, length, folder / 'python')]
     if c_loop:
@@ -268,7 +274,7 @@ def run_rate(rate, arguments, folder, c_loop, with_setter=False):
     reference = seconds_of(rows['c'], rate) if 'c' in rows else Counter()
     trips = np.frombuffer((folder / 'trips').read_bytes())
     names = {'c': 'C, clock_nanosleep', 'python': 'Python, no work',
-             'node': 'node, parameters set at 10 Hz' if with_setter else 'node'}
+             'node': f'node, {BESIDE[beside]}' if beside else 'node'}
     return [describe(names[name], rows[name], rate, reference, folder / name,
                      trips if name == 'node' else None) for name in rows]
 
@@ -319,11 +325,13 @@ def main():
     with own_domain() as domain, tempfile.TemporaryDirectory() as folder:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         c_loop = compiled(Path(folder))
-        # each rate, and the last one once more with a client that sets parameters
-        for n, rate in enumerate([*arguments.rates, arguments.rates[-1]]):
+        # each rate, and the last one once more with each load
+        runs = [(rate, None) for rate in arguments.rates]
+        runs += [(arguments.rates[-1], beside) for beside in BESIDE]
+        for n, (rate, beside) in enumerate(runs):
             sub = Path(folder) / str(n)
             sub.mkdir()
-            for cells in run_rate(rate, arguments, sub, c_loop, n == len(arguments.rates)):
+            for cells in run_rate(rate, arguments, sub, c_loop, beside):
                 print('| ' + ' | '.join(cells) + ' |', flush=True)
         if not c_loop:
             print('\nno C compiler here: no C loop')

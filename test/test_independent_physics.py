@@ -15,6 +15,7 @@ difference must fall with the step, and what an extrapolation to no step leaves 
 """
 
 import dataclasses
+from functools import cache
 from math import tanh
 import os
 
@@ -175,15 +176,29 @@ SELF_LOCKING = {
                        l_1=0.02, l_2=0.05, l_s=0.01)}
 
 
+@cache
+def symmetric_run(name, integrator, step):
+    """Return the run of MuJoCo beside which each variant stands."""
+    p = SYMMETRIC[name]
+    return mujoco_run(symmetric_rotors(p, step, integrator), held('symmetric_ode'))
+
+
+@cache
+def self_locking_run(name, integrator, step):
+    """Return the run of MuJoCo beside which each variant stands."""
+    p = SELF_LOCKING[name]
+    rotors = self_locking_rotors(p, step, integrator)
+    return mujoco_run(rotors, held('lsd_ode'), preload_friction(p, rotors.model))
+
+
 @pytest.mark.parametrize('variant', ['symmetric_ode', 'symmetric_dae'])
 @pytest.mark.parametrize('name', SYMMETRIC)
 class TestSymmetric:
     """Speeds reach some hundred rad/s and moments some ten N m."""
 
     def runs(self, variant, name, integrator, *steps):
-        p, load = SYMMETRIC[name], held(variant)
-        return our_run(variant, p, load, 1), [
-            mujoco_run(symmetric_rotors(p, step, integrator), load) for step in steps]
+        return our_run(variant, SYMMETRIC[name], held(variant), 1), [
+            symmetric_run(name, integrator, step) for step in steps]
 
     def test_difference_to_euler_halves_with_its_step_and_extrapolates_to_none(
             self, variant, name):
@@ -207,12 +222,9 @@ class TestSelfLockingWithPreloadAlone:
     """The shafts lock and slip, speeds reach some hundred rad/s and moments a hundred N m."""
 
     def runs(self, variant, name, integrator, *steps):
-        p, load = SELF_LOCKING[name], held(variant)
-        runs = []
-        for step in steps:
-            rotors = self_locking_rotors(p, step, integrator)
-            runs.append(mujoco_run(rotors, load, preload_friction(p, rotors.model)))
-        return our_run(variant, p, load, 20), runs   # substeps: beyond our own tolerance
+        # substeps: beyond our own tolerance
+        return our_run(variant, SELF_LOCKING[name], held(variant), 20), [
+            self_locking_run(name, integrator, step) for step in steps]
 
     def test_difference_to_euler_halves_with_its_step_and_extrapolates_to_none(
             self, variant, name):
@@ -231,5 +243,5 @@ class TestSelfLockingWithPreloadAlone:
 def test_a_wrong_inertia_would_show():
     p, load = SYMMETRIC['defaults'], held('symmetric_ode')
     wrong = dataclasses.replace(p, I_s=1.01 * p.I_s)
-    run = mujoco_run(symmetric_rotors(p, 1.25e-4, 'RK4'), load)
+    run = symmetric_run('defaults', 'RK4', 1.25e-4)
     assert largest(run, our_run('symmetric_ode', wrong, load, 1))[0] > 0.01

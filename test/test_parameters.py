@@ -202,8 +202,9 @@ def test_clutch_that_locks_the_mechanism_is_refused_by_name(shaft, change):
 def determinants(p):
     """Return det(I + W diag(+-tan(alpha) f_1, +-tan(alpha) f_2)), a row a direction of flow."""
     phi = np.array(full_friction(p)[0])
-    return np.array([[np.linalg.det(np.eye(2) + SelfLockingOde(p).response(d).W * phi * signs)
-                      for signs in itertools.product((1, -1), repeat=2)] for d in BOTH])
+    signs = np.array(list(itertools.product((1, -1), repeat=2)))[:, None, :]
+    return np.array([np.linalg.det(np.eye(2) + SelfLockingOde(p).response(d).W * phi * signs)
+                     for d in BOTH])
 
 
 @pytest.mark.parametrize('share', [None, 0.9, 0.999])

@@ -5,6 +5,9 @@
 
 import csv
 
+# loaded for good: what a run of pytest in this process loads, it forgets at its end
+import matplotlib.backends.backend_agg  # noqa: F401
+import matplotlib.figure  # noqa: F401
 import pytest
 
 from dm_ros import Simulation
@@ -55,7 +58,8 @@ def test_a_failing_test_leaves_its_record_and_a_passing_one_does_not(pytester):
             record = vehicle.run(lambda snapshot: (300.0, -100.0, -150.0), seconds=0.05)
             assert record.velocity['carrier'].max() < limit
     """)
-    result = pytester.runpytest_subprocess('--differential-records', 'left')
+    result = pytester.runpytest_inprocess(   # hypothesis, not needed, takes longer than the rest
+        '-p', 'no:hypothesispytest', '--differential-records', 'left')
     result.assert_outcomes(passed=1, failed=1)
     left = sorted((pytester.path / 'left').iterdir())
     assert [path.suffix for path in left] == ['.csv', '.png']
@@ -73,4 +77,4 @@ def test_the_plugin_loads_neither_ros_nor_matplotlib_where_no_test_wants_it(pyte
         def test_nothing():
             assert not {'rclpy', 'matplotlib'} & set(sys.modules)
     """)
-    pytester.runpytest_subprocess().assert_outcomes(passed=1)
+    pytester.runpytest_subprocess('-p', 'no:hypothesispytest').assert_outcomes(passed=1)

@@ -4,6 +4,7 @@
 """The property tests of ``test_properties``, at length."""
 
 from properties import Tally
+from test_properties import compare_with_the_page
 
 from dm_ros.tools.progress import progress
 
@@ -16,3 +17,7 @@ def test_no_random_differential_breaks_a_law_or_fails():
         tally.run(n)
     print(f'\n{tally}')
     assert tally.cases == CASES
+
+
+def test_the_page_on_the_power_flow_index_prints_all_that_it_says():
+    compare_with_the_page(range(32))

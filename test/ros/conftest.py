@@ -3,6 +3,7 @@
 
 """Fixtures for tests over real topics: each test has its own context in its own domain."""
 
+import math
 import time
 
 import pytest
@@ -10,8 +11,11 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
+from dm_ros.ros import loops
 from dm_ros.ros.domain import own_domain
 from dm_ros.ros.node import DifferentialNode
+
+PATIENCE = 60.0   # s of real time until a condition that will come true is given up
 
 
 class Ros:
@@ -35,29 +39,43 @@ class Ros:
         node = DifferentialNode(context=self.context, parameter_overrides=overrides,
                                 cli_args=list(arguments))
         self._differentials.append(node)
+        timer, = node.timers
+        assert timer.timer_period_ns == 10**9
+        timer.timer_period_ns = 10**8   # nobody wants to wait a second for /diagnostics
         self.executor.add_node(node)
         node.start()
         return node
 
-    def until(self, condition, timeout=20.0):
+    def until(self, condition, timeout=PATIENCE):
         """Spin until the condition holds; fail when it does not in time."""
         end = time.monotonic() + timeout
         while not condition():
             assert time.monotonic() < end, 'the condition did not come true in time'
-            self.executor.spin_once(timeout_sec=0.05)
+            self.executor.spin_once(timeout_sec=0.01)
 
     def listen(self, message_type, topic, depth=1000):
-        """Return a list that fills with the messages of a topic, once a publisher is there."""
+        """Return a list that fills with the messages of a topic, once both sides are connected."""
+        publishers = self._of_differentials('publishers', topic)
+        before = [publisher.get_subscription_count() for publisher in publishers]
         messages = []
         subscription = self.node.create_subscription(message_type, topic, messages.append, depth)
-        self.until(lambda: subscription.get_publisher_count() > 0)
+        self.until(lambda: subscription.get_publisher_count() > 0 and all(
+            p.get_subscription_count() > count for p, count in zip(publishers, before)))
         return messages
 
-    def publisher(self, message_type, topic):
-        """Return a publisher, once a subscription is there."""
-        publisher = self.node.create_publisher(message_type, topic, 10)
-        self.until(lambda: publisher.get_subscription_count() > 0)
+    def publisher(self, message_type, topic, depth=10):
+        """Return a publisher, once both sides are connected."""
+        subscriptions = self._of_differentials('subscriptions', topic)
+        before = [subscription.get_publisher_count() for subscription in subscriptions]
+        publisher = self.node.create_publisher(message_type, topic, depth)
+        self.until(lambda: publisher.get_subscription_count() > 0 and all(
+            s.get_publisher_count() > count for s, count in zip(subscriptions, before)))
         return publisher
+
+    def _of_differentials(self, kind, topic):
+        """Return the publishers or subscriptions of a topic in the nodes of this process."""
+        return [end for node in self._differentials for end in getattr(node, kind)
+                if end.topic_name == topic]
 
     def call(self, service_type, name, **request):
         """Return the response of a service."""
@@ -67,6 +85,11 @@ class Ros:
         self.until(future.done)
         self.node.destroy_client(client)
         return future.result()
+
+    def stop(self):
+        """Let the differentials make no more ticks."""
+        for node in self._differentials:
+            node.control.stopping.set()
 
     def close(self):
         for node in self._differentials:
@@ -82,3 +105,58 @@ def ros(monkeypatch):
         user = Ros(monkeypatch, domain)
         yield user
         user.close()
+
+
+class SteadyClock:
+    """
+    The steady clock for the loop of a node, which goes on only as far as a test lets it.
+
+    However slow the machine, the node meets every deadline: what it makes of them is exact.
+    """
+
+    READING = 1000   # ns that the clock goes on from one reading to the next
+
+    def __init__(self, ros):
+        self._ros = ros
+        self._now, self._end = 0, 500_000   # ns; far from where the loop watches a deadline
+        self._wanted = 0   # how far the loop wants to sleep
+
+    def passes(self, seconds):
+        """Let so much time pass: a whole number of ticks of the node."""
+        self._end += seconds * 1e9
+
+    def leaps(self, seconds):
+        """Let so much time pass at once, as for a loop that is paused."""
+        self._now += seconds * 1e9
+        self._end += seconds * 1e9
+
+    def stands(self):
+        """Return whether all time has passed: the loop sleeps until there is more."""
+        return self._wanted > self._end
+
+    def tick(self, node, *heard):
+        """Let a node make a tick, and wait until each list of messages has one more."""
+        lengths = [len(messages) for messages in heard]
+        self.passes(node.simulation.dt)
+        self._ros.until(lambda: self.stands() and all(
+            len(messages) > length for messages, length in zip(heard, lengths)))
+
+    def monotonic_ns(self):
+        self._now = min(self._now + self.READING, self._end)
+        return self._now
+
+    def sleep(self, seconds):
+        self._wanted = self._now + round(seconds * 1e9)
+        while self.stands():
+            time.sleep(0.0005)
+        self._now = max(self._now, self._wanted)
+
+
+@pytest.fixture
+def steady(ros, monkeypatch):
+    """Return the ``SteadyClock`` by which the nodes of the test run."""
+    clock = SteadyClock(ros)
+    monkeypatch.setattr(loops, 'time', clock)
+    yield clock
+    ros.stop()
+    clock.passes(math.inf)   # the loops see it

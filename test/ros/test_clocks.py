@@ -51,7 +51,7 @@ def test_a_clock_that_stands_still_pauses_it(ros, follower):
     simulator.show(10**9 + 50_000_000, node, 5)
     before = node.get_clock().now().nanoseconds
     reports = ros.listen(DiagnosticArray, '/diagnostics')
-    ros.until(lambda: len(reports) == 2)   # a second of real time
+    ros.until(lambda: len(reports) == 4)   # more than a quarter of a second of real time
     assert (node.simulation.ticks, node.get_clock().now().nanoseconds) == (5, before)
 
 
@@ -88,32 +88,25 @@ def test_it_cannot_follow_and_drive_the_clock_at_once(ros):
         ros.differential(use_sim_time=True, publish_clock=True)
 
 
-def test_a_driven_clock_goes_with_the_ticks_in_real_time_and_paused(ros):
+def test_a_driven_clock_goes_with_the_ticks_in_real_time_and_paused(ros, steady):
     node = ros.differential(rate=200.0, publish_clock=True)
     joints = ros.listen(JointState, '/differential/joint_states')
     clock = ros.listen(Clock, '/clock')
-    ros.until(lambda: len(clock) > 10)
+    for _ in range(10):
+        steady.tick(node, joints, clock)
     ros.call(SetBool, '/differential/pause', data=True)
-    ticks = node.simulation.ticks
     assert ros.call(Trigger, '/differential/step').success
-    ros.until(lambda: clock[-1].clock.nanosec + clock[-1].clock.sec * 10**9
-              == (ticks + 1) * 5_000_000)
-    ros.until(lambda: joints[-1].header.stamp == clock[-1].clock)
-    times = [m.clock.sec * 10**9 + m.clock.nanosec for m in clock]
-    assert {b - a for a, b in zip(times, times[1:])} == {5_000_000}
+    ros.until(lambda: len(joints) == len(clock) == 11)
+    assert [m.clock.sec * 10**9 + m.clock.nanosec for m in clock] == [
+        n * 5_000_000 for n in range(1, 12)]
+    assert [m.header.stamp for m in joints] == [m.clock for m in clock]
 
 
 @pytest.mark.parametrize('factor', [0.1, 5.0])
-def test_the_real_time_factor_is_the_speed_of_simulated_time(ros, factor):
-    fast = ros.differential(rate=100.0, real_time_factor=factor)
-    plain = ros.differential(rate=100.0)
-
-    def made():
-        # missed ticks count as made
-        return [n.simulation.ticks + n._pacer.missed for n in (fast, plain)]
-    ros.until(lambda: min(made()) > 0)   # they start one after the other
-    before = made()
-    ros.until(lambda: min(now - then for now, then in zip(made(), before)) >= 20)
-    # two in one run on one machine: their ratio, whatever its load
-    fast_made, plain_made = (now - then for now, then in zip(made(), before))
-    assert fast_made / plain_made == pytest.approx(factor, rel=0.25)
+def test_the_real_time_factor_is_the_speed_of_simulated_time(ros, steady, factor):
+    node = ros.differential(rate=100.0, real_time_factor=factor)
+    steady.passes(2.0)
+    ros.until(steady.stands)
+    assert node.simulation.ticks == 200 * factor
+    assert node.simulation.time == pytest.approx(2.0 * factor)
+    assert node._pacer.missed == 0

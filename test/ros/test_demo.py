@@ -3,31 +3,45 @@
 
 """The demo: two processes over DDS, recorded, reported, drawn."""
 
+from contextlib import ExitStack
 import csv
-import os
-import subprocess
-import sys
 
+from processes import command, Forked
 import pytest
 
 from dm_ros.files.columns import column_names
 from dm_ros.motion.simulation import Simulation
 
-
-def demo(folder, *arguments):
-    return subprocess.run(
-        [sys.executable, '-m', 'dm_ros.tools.demo', '--out', str(folder), '--duration', '1.5',
-         *arguments],
-        capture_output=True, text=True, timeout=90)
+DEMO = command('tools.demo')
+VARIANTS = ('symmetric_dae', 'lsd_lagged')
 
 
-@pytest.mark.parametrize('variant', ['symmetric_dae', 'lsd_lagged'])
-def test_it_records_what_the_node_publishes_and_draws_it(tmp_path, variant):
-    done = demo(tmp_path, '--variant', variant, '--rate', '100')
-    assert done.returncode == 0, done.stderr
+@pytest.fixture(scope='module')
+def runs(tmp_path_factory):
+    """Return (folder, exit code, stdout, stderr) by variant, of runs beside each other."""
+    folders = {variant: tmp_path_factory.mktemp(variant) for variant in VARIANTS}
+    with ExitStack() as stack:
+        demos = {variant: stack.enter_context(Forked(
+            DEMO, '--variant', variant, '--out', folder, '--rate', 100, '--duration', 1))
+            for variant, folder in folders.items()}
+        return {variant: (folders[variant], demo.ended(), demo.output, demo.errors)
+                for variant, demo in demos.items()}
+
+
+def test_runs_beside_each_other_do_not_hear_each_other(runs):
+    for variant, (folder, code, _, errors) in runs.items():
+        assert code == 0, errors
+        with open(folder / f'{variant}.csv', newline='') as file:
+            assert next(csv.reader(file)) == column_names(Simulation(variant))
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_it_records_what_the_node_publishes_and_draws_it(runs, variant):
+    folder, code, output, errors = runs[variant]
+    assert code == 0, errors
     for word in ('rate held', 'missed ticks', 'power flow', 'velocity carrier', 'lowest'):
-        assert word in done.stdout
-    with open(tmp_path / f'{variant}.csv', newline='') as file:
+        assert word in output
+    with open(folder / f'{variant}.csv', newline='') as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == column_names(Simulation(variant))
     times = [float(row['time']) for row in rows]
@@ -36,25 +50,15 @@ def test_it_records_what_the_node_publishes_and_draws_it(tmp_path, variant):
     # the torques arrived and the shafts turned
     for column in (f'torque.{Simulation(variant).inputs[0]}', 'velocity.carrier'):
         assert any(float(row[column]) for row in rows)
-    assert (tmp_path / f'{variant}.png').read_bytes().startswith(b'\x89PNG')
+    assert (folder / f'{variant}.png').read_bytes().startswith(b'\x89PNG')
 
 
 def test_a_bad_variant_or_an_unwritable_folder_ends_it_with_one_line(tmp_path):
     blocked = tmp_path / 'file'
     blocked.write_text('')
-    done = demo(blocked / 'folder')
-    assert done.returncode == 1
-    line, = done.stderr.strip().splitlines()
-    assert line.startswith('demo: ')
-    assert demo(tmp_path, '--variant', 'torsen').returncode == 2
-
-
-def test_runs_beside_each_other_do_not_hear_each_other(tmp_path):
-    command = [sys.executable, '-m', 'dm_ros.tools.demo', '--duration', '1.5', '--rate', '50']
-    runs = [subprocess.Popen([*command, '--variant', variant, '--out', str(tmp_path / variant)],
-                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                             env=os.environ)
-            for variant in ('symmetric_ode', 'lsd_ode')]
-    for run in runs:
-        _, errors = run.communicate(timeout=120)
-        assert run.returncode == 0, errors
+    with Forked(DEMO, '--out', blocked / 'folder') as demo:
+        assert demo.ended() == 1
+        line, = demo.errors.strip().splitlines()
+        assert line.startswith('demo: ')
+    with Forked(DEMO, '--out', tmp_path, '--variant', 'torsen') as demo:
+        assert demo.ended() == 2

@@ -6,6 +6,14 @@
 from pathlib import Path
 import re
 
+# loaded for good: what a run of pytest in this process loads, it forgets at its end
+import matplotlib.backends.backend_agg  # noqa: F401
+import matplotlib.figure  # noqa: F401
+import pytest
+
+import dm_ros.ros.node  # noqa: F401
+import dm_ros.testing.lockstep  # noqa: F401
+
 pytest_plugins = ['pytester']
 
 ROOT = Path(__file__).parents[2]
@@ -13,15 +21,22 @@ BLOCKS = re.findall(r'^```python\n# (\w+)\.py\n(.*?)^```', (
     ROOT / 'doc' / 'testing.md').read_text(), re.MULTILINE | re.DOTALL)
 
 
-def test_the_blocks_of_the_page_run(pytester):
+@pytest.fixture
+def run(pytester):
+    """Return a function that runs the tests of ``pytester`` in this process."""
+    # the plugin of hypothesis, which nobody needs there, takes longer than the rest
+    return lambda *arguments: pytester.runpytest_inprocess('-p', 'no:hypothesispytest', *arguments)
+
+
+def test_the_blocks_of_the_page_run(pytester, run):
     pytester.makepyfile(**dict(BLOCKS))
     tests = sum(source.count('\ndef test_') for _, source in BLOCKS)
     assert tests == 5
-    pytester.runpytest_subprocess('--differential-records', 'left').assert_outcomes(passed=tests)
+    run('--differential-records', 'left').assert_outcomes(passed=tests)
     assert not (pytester.path / 'left').exists()
 
 
-def test_the_failing_test_of_a_user_leaves_each_of_its_differentials(pytester):
+def test_the_failing_test_of_a_user_leaves_each_of_its_differentials(pytester, run):
     pytester.makepyfile(**{name: source for name, source in BLOCKS if name == 'governor'})
     pytester.makepyfile(test_it="""
         from governor import Governor, SpeedLaw
@@ -33,13 +48,13 @@ def test_the_failing_test_of_a_user_leaves_each_of_its_differentials(pytester):
                 record = vehicle.run(seconds=0.1)
             assert record.velocity['carrier'].max() < 0.0
     """)
-    pytester.runpytest_subprocess('--differential-records', 'left').assert_outcomes(failed=1)
+    run('--differential-records', 'left').assert_outcomes(failed=1)
     left = sorted(path.name for path in (pytester.path / 'left').iterdir())
     assert left == [f'test_it.py_test_too_much_{n}.{kind}' for n in (1, 2)
                     for kind in ('csv', 'png')]
 
 
-def test_an_exception_in_a_node_of_the_test_is_the_test_s(pytester):
+def test_an_exception_in_a_node_of_the_test_is_the_test_s(pytester, run):
     pytester.makepyfile(test_it="""
         import pytest
         from rclpy.node import Node
@@ -57,4 +72,4 @@ def test_an_exception_in_a_node_of_the_test_is_the_test_s(pytester):
             with pytest.raises(ZeroDivisionError):
                 vehicle.run(seconds=1.0)
     """)
-    pytester.runpytest_subprocess().assert_outcomes(passed=1)
+    run().assert_outcomes(passed=1)

@@ -3,7 +3,7 @@
 
 """Faults around the processes: signals, kills, floods, missing rights, full disks."""
 
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 import ctypes
 import fcntl
 import os
@@ -15,17 +15,18 @@ import subprocess
 import sys
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray
+from processes import command, Forked, PATIENCE
 import pytest
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 
 from dm_ros.files.record import Record
 from dm_ros.testing import DirectDifferential
 
 ROOT = Path(__file__).parents[2]
-NODE = [sys.executable, '-m', 'dm_ros.ros.command']
+NODE = command('ros.command')
 # as the command does, and it tells when a signal no longer is the interpreter's affair
-TELLING_NODE = [sys.executable, '-c', """
+TELLING_NODE = """
 import signal, sys
 from dm_ros.ros.command import main
 set_handler, told = signal.signal, []
@@ -36,24 +37,30 @@ def tell(number, handler):
         print('begun', flush=True)
 signal.signal = tell
 sys.exit(main([]))
-"""]
-PATIENCE = 60.0
+"""
 CAP_SYS_NICE, PR_CAPBSET_DROP = 23, 24
 
 
 @pytest.fixture
 def start(ros):
-    """Return a function that starts a process with pipes, ended after the test."""
+    """Return a function that starts Python with pipes; it is ended after the test."""
     processes = []
 
-    def start(command, **options):
-        processes.append(subprocess.Popen(command, stdout=subprocess.PIPE,
+    def start(*arguments, **options):
+        processes.append(subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE,
                                           stderr=subprocess.PIPE, text=True, **options))
         return processes[-1]
     yield start
     for process in processes:
         process.kill()
         process.communicate()
+
+
+@pytest.fixture
+def fork(ros):
+    """Return a function that starts a ``Forked`` process, ended after the test."""
+    with ExitStack() as stack:
+        yield lambda *arguments, **options: stack.enter_context(Forked(*arguments, **options))
 
 
 def hear(ros, message_type, topic):
@@ -63,15 +70,14 @@ def hear(ros, message_type, topic):
     return messages
 
 
-def until(ros, condition, *processes):
-    """Spin until the condition holds while the processes live."""
-    ros.until(lambda: condition() or any(p.poll() is not None for p in processes), PATIENCE)
-    for process in processes:
-        assert process.poll() is None, process.communicate()
+def until(ros, condition, process):
+    """Spin until the condition holds while the process lives."""
+    ros.until(lambda: condition() or process.returncode is not None)
+    assert process.returncode is None, process.errors
 
 
 def end(process, number=signal.SIGTERM):
-    """End a process and return what it said on stderr; it must end with exit code 0."""
+    """End a process that was started; it must end with exit code 0; return its stderr."""
     process.send_signal(number)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
@@ -83,7 +89,7 @@ def end(process, number=signal.SIGTERM):
 
 def signal_at(start, number, delay, again=None):
     """Send a signal a while after the node began, and perhaps once more; it must end quietly."""
-    process = start(TELLING_NODE)
+    process = start('-c', TELLING_NODE)
     assert process.stdout.readline() == 'begun\n'
     time.sleep(delay)
     process.send_signal(number)
@@ -97,7 +103,7 @@ def signal_at(start, number, delay, again=None):
 
 def start_up_time(start):
     """Return how long the node takes from its first line to its first tick, s."""
-    process = start(TELLING_NODE)
+    process = start('-c', TELLING_NODE)
     process.stdout.readline()
     begin = time.monotonic()
     assert 'at 200 Hz' in process.stderr.readline()
@@ -107,12 +113,11 @@ def start_up_time(start):
 
 
 def sweep(start, count):
-    """Send signals at so many moments from the first line of the node to beyond its end."""
+    """Send the two signals in turn, from the first line of the node to beyond its first tick."""
     whole = start_up_time(start)
     for n in range(count):
-        delay = 1.3 * whole * n / max(1, count - 1)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal_at(start, number, delay, again=[None, 0.0, 0.01, 0.03][n % 4])
+        signal_at(start, (signal.SIGINT, signal.SIGTERM)[n % 2], 1.3 * whole * n / (count - 1),
+                  again=[None, 0.0, 0.01, 0.03][n // 2 % 4])
 
 
 def test_a_signal_at_any_moment_ends_it_with_exit_code_0_and_no_traceback(start):
@@ -122,17 +127,16 @@ def test_a_signal_at_any_moment_ends_it_with_exit_code_0_and_no_traceback(start)
 # Kills
 
 
-def kill_and_restart(ros, start, times):
+def kill_and_restart(ros, fork, times):
     """Kill the node so often as soon as it ticks, and return its last process, which ticks."""
     joints = hear(ros, JointState, '/differential/joint_states')
     for n in range(times + 1):
-        process = start(NODE)
+        process = fork(NODE)
         joints.clear()
         # what was killed sends no more, and what is heard comes from the new one
         until(ros, lambda: len(joints) > 3, process)
         if n < times:
-            process.kill()
-            process.communicate()
+            process.ended(signal.SIGKILL)
     return process
 
 
@@ -151,73 +155,45 @@ def orphans():
 
 
 @pytest.mark.skipif(not os.path.isdir('/dev/shm'), reason='needs /dev/shm')
-def test_killed_and_restarted_it_runs_and_clears_what_the_killed_left(ros, start):
-    kill_and_clear(ros, start, 4)
+def test_killed_and_restarted_it_runs_and_clears_what_the_killed_left(ros, fork):
+    kill_and_clear(ros, fork, 2)
 
 
-def kill_and_clear(ros, start, times):
+def kill_and_clear(ros, fork, times):
     """Kill and restart so often; what the killed left in /dev/shm goes with a later start."""
-    end(kill_and_restart(ros, start, times))
+    assert kill_and_restart(ros, fork, times).ended(signal.SIGTERM) == 0
     left = orphans()
     for path in left:   # as if the last kills were some time ago
         with suppress(FileNotFoundError):   # somebody else's node was faster
             os.utime(path, (0, 0))
-    process = start(NODE)
-    assert 'at 200 Hz' in process.stderr.readline()
-    end(process)
+    process = fork(NODE)
+    process.says('at 200 Hz')
+    assert process.ended(signal.SIGTERM) == 0
     assert not [path for path in left if path.exists()]
 
 
 # Floods
 
-FLOOD = """
-import sys, time
-import rclpy
-from std_msgs.msg import Float64
-rclpy.init()
-publisher = rclpy.create_node('flood').create_publisher(
-    Float64, '/flooded/torque/left', 10)
-message, sent, begin = Float64(data=1.0), 0, time.monotonic()
-while not publisher.get_subscription_count():
-    time.sleep(0.01)
-print('begun', flush=True)
-begin = time.monotonic()
-try:
-    while rclpy.ok():
-        publisher.publish(message)
-        sent += 1
-        time.sleep(max(0.0, begin + sent * 1e-4 - time.monotonic()))
-finally:
-    print(sent / (time.monotonic() - begin), flush=True)
-"""
 
+def test_a_publisher_at_10_khz_takes_no_tick(ros, steady):
+    """Fifty messages between two ticks are one message to the node: the newest."""
+    node = ros.differential(torque_timeout=0.0)
+    flood = ros.publisher(Float64, '/differential/torque/left')
+    sent = ticks = 0
 
-def test_a_publisher_at_10_khz_takes_no_tick(ros, start):
-    """Two nodes in one run: the flooded one makes as many ticks as the other, to 1 %."""
-    diagnostics = hear(ros, DiagnosticArray, '/diagnostics')
-    nodes = [start([*NODE, '--ros-args', '-r', f'__node:={name}'])
-             for name in ('flooded', 'calm')]
+    def flooded():
+        """Flood a tick, and return whether it took the newest message of the flood."""
+        nonlocal sent, ticks
+        for _ in range(50):
+            sent += 1
+            flood.publish(Float64(data=float(sent)))
+        ticks += 1
+        steady.tick(node)
+        assert node.simulation.ticks == ticks >= node._inputs.received
+        return ticks >= 20 and node.simulation.snapshot().torque[1] == sent
 
-    def ticks(name):
-        return [int(pair.value) for message in diagnostics for status in message.status
-                for pair in status.values if status.name == f'{name}: loop'
-                and pair.key == 'ticks']
-
-    until(ros, lambda: ticks('flooded') and ticks('calm'), *nodes)
-    flood = start([sys.executable, '-c', FLOOD])
-    assert flood.stdout.readline() == 'begun\n'
-
-    def equal():
-        """Return whether over three seconds both made as many ticks, to 1 %."""
-        flooded, calm = ticks('flooded')[-4:], ticks('calm')[-4:]
-        if len(flooded) < 4 or len(calm) < 4:
-            return False
-        return abs((flooded[-1] - flooded[0]) / (calm[-1] - calm[0]) - 1.0) < 0.01
-    diagnostics.clear()
-    until(ros, equal, *nodes, flood)
-    flood.send_signal(signal.SIGINT)
-    output, _ = flood.communicate(timeout=PATIENCE)
-    assert float(output) > 10 * 200   # far more than the ticks can take
+    ros.until(flooded)
+    assert node._pacer.missed == 0
 
 
 # Rights and places
@@ -230,81 +206,72 @@ def without_rights():
 
 
 def test_without_the_right_to_a_priority_it_warns_and_goes_on(ros, start):
-    process = start([*NODE, '--ros-args', '-p', 'realtime_priority:=50'],
+    # the bounding set counts when a program is executed, so a fork will not do
+    process = start('-c', NODE, '--ros-args', '-p', 'realtime_priority:=50',
                     preexec_fn=without_rights)
     joints = hear(ros, JointState, '/differential/joint_states')
-    until(ros, lambda: len(joints) > 20, process)
+    ros.until(lambda: len(joints) > 20)
     errors = end(process)
     assert errors.count('realtime_priority 50: Operation not permitted; going on without') == 1
 
 
-def test_without_a_home_it_runs(ros, start):
+def test_without_a_home_it_runs(ros, fork):
     places = ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')
-    process = start(NODE, env={k: v for k, v in os.environ.items() if k not in places})
+    process = fork(NODE, env={k: v for k, v in os.environ.items() if k not in places})
     joints = hear(ros, JointState, '/differential/joint_states')
     until(ros, lambda: len(joints) > 3, process)
-    assert 'Traceback' not in end(process)
+    assert process.ended(signal.SIGTERM) == 0
+    assert 'Traceback' not in process.errors
 
 
-def test_where_it_cannot_write_its_log_it_ends_with_one_line(start):
-    process = start(NODE, env={**os.environ, 'ROS_LOG_DIR': '/proc/none'})
-    _, errors = process.communicate(timeout=PATIENCE)
-    line, = errors.strip().splitlines()
-    assert process.returncode == 2
+def test_where_it_cannot_write_its_log_it_ends_with_one_line(fork):
+    process = fork(NODE, env={**os.environ, 'ROS_LOG_DIR': '/proc/none'})
+    assert process.ended() == 2
+    line, = process.errors.strip().splitlines()
     assert line.startswith('differential: error: ') and '/proc/none' in line
 
 
 # Full disks and folders that nobody can write to
 
 TORQUES = 'time,pinion,left,right\n0,10,-15,-16\n5,0,0,0\n'
-WRITERS = {   # what writes, and what it says when the disk is full, with the exit code
-    'simulate, CSV': ("from dm_ros.tools.simulate import main; sys.exit(main(['--variant', "
-                      "'symmetric_ode', '--torques', 'in.csv', '--out', 'out/result']))", 2),
-    'simulate, picture': ("from dm_ros.tools.simulate import main; sys.exit(main(['--variant', "
-                          "'symmetric_ode', '--torques', 'in.csv', '--plot', 'out/result']))", 2),
-    'demo, CSV': ('from test_demo_on_a_full_disk import run; run(10000)', 1),
-    'demo, picture': ('from test_demo_on_a_full_disk import run; run(10)', 1),
-}
+SMALL_FILES = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384))   # the disk is full then
+"""
+SIMULATE = """
+from dm_ros.tools.simulate import main
+sys.exit(main(['--variant', 'symmetric_ode', '--torques', 'in.csv', *sys.argv[1:]]))
+"""
 DEMO = """
-import sys, types
+import types
 import numpy
 from dm_ros.files.columns import column_names
 from dm_ros.files.record import Record
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.tools import demo
-
-def run(rows):
-    names = column_names(SYMMETRIC)
-    record = Record(SYMMETRIC, numpy.tile(numpy.arange(rows) / 7, (len(names), 1)).T, 'full')
-    recorder = types.SimpleNamespace(record=lambda *_: record, missed=0)
-    demo.run_processes = lambda arguments: recorder
-    sys.exit(demo.main(['--out', 'out']))
+rows = numpy.tile(numpy.arange(int(sys.argv[1])) / 7, (len(column_names(SYMMETRIC)), 1)).T
+demo.run_processes = lambda arguments: types.SimpleNamespace(
+    record=lambda *_: Record(SYMMETRIC, rows, 'full'), missed=0)
+sys.exit(demo.main(['--out', 'out']))
 """
-
-
-def small_files():
-    """Let no file of this process grow beyond 16 kB: the disk is full then."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384))
+WRITERS = {   # what writes, with which arguments, the exit code and what is left
+    'simulate, CSV': (SIMULATE, ['--out', 'out/result'], 2, []),
+    'simulate, picture': (SIMULATE, ['--plot', 'out/result'], 2, []),
+    'demo, CSV': (DEMO, [10_000], 1, []),
+    # the demo writes its CSV before its picture, and whole
+    'demo, picture': (DEMO, [10], 1, ['symmetric_ode.csv'])}
 
 
 @pytest.mark.parametrize('what', WRITERS)
-def test_a_full_disk_is_told_in_one_line_and_leaves_no_half_file(start, tmp_path, what):
-    code, exit_code = WRITERS[what]
+def test_a_full_disk_is_told_in_one_line_and_leaves_no_half_file(fork, tmp_path, what):
+    source, arguments, exit_code, left = WRITERS[what]
     (tmp_path / 'out').mkdir()
     (tmp_path / 'in.csv').write_text(TORQUES)
-    (tmp_path / 'test_demo_on_a_full_disk.py').write_text(DEMO)
-    process = start(
-        [sys.executable, '-c', f'import sys; sys.path.insert(0, "."); import matplotlib.figure; '
-         f'import matplotlib.font_manager; {code}'], cwd=tmp_path, preexec_fn=small_files,
-        env={**os.environ, 'PYTHONDONTWRITEBYTECODE': '1', 'PYTHONPATH': os.pathsep.join(
-            path or os.getcwd() for path in sys.path)})
-    _, errors = process.communicate(timeout=PATIENCE)
-    line, = errors.strip().splitlines()
-    assert process.returncode == exit_code, errors
+    process = fork(SMALL_FILES + source, *arguments, folder=tmp_path)
+    assert process.ended() == exit_code, process.errors
+    line, = process.errors.strip().splitlines()
     assert 'File too large' in line and 'out/' in line
-    left = [path.name for path in (tmp_path / 'out').iterdir()]
-    # the demo writes its CSV before its picture, and whole
-    assert left == (['symmetric_ode.csv'] if what == 'demo, picture' else [])
+    assert [path.name for path in (tmp_path / 'out').iterdir()] == left
 
 
 @pytest.mark.parametrize('save', [Record.save_csv, Record.save_plot])

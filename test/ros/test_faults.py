@@ -4,16 +4,16 @@
 """Faults on the topics, the services and the clocks of a node in this process."""
 
 import ast
+from contextlib import ExitStack
 import math
 from pathlib import Path
 import re
 import signal
-import subprocess
-import sys
 import time
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from processes import Forked
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.clock import ClockType
@@ -25,6 +25,7 @@ from std_msgs.msg import Float64
 from dm_ros.motion.pacing import Pacer
 from dm_ros.ros import loops
 from dm_ros.ros.loops import Control, follow_steady_clock
+from dm_ros.ros.messages import LOCKSTEP_OUTPUT_QOS
 
 ROOT = Path(__file__).parents[2]
 TORQUES, JOINTS = '/differential/torques', '/differential/joint_states'
@@ -64,19 +65,10 @@ def told(diagnostics, which, node='differential'):
 
 
 @pytest.fixture
-def listeners():
+def listeners(ros):
     """Return a function that starts subscribers to the joint states, ended after the test."""
-    processes = []
-
-    def start(*arguments):
-        process = subprocess.Popen([sys.executable, '-c', SUBSCRIBER, *map(str, arguments)],
-                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        processes.append(process)
-        return process
-    yield start
-    for process in processes:
-        process.kill()
-        process.communicate()
+    with ExitStack() as stack:
+        yield lambda *arguments: stack.enter_context(Forked(SUBSCRIBER, *arguments))
 
 
 # Numbers and names
@@ -151,7 +143,7 @@ def test_in_lockstep_a_stamp_of_the_far_future_holds_until_a_reset(ros):
     publisher = ros.publisher(JointState, TORQUES)
     publisher.publish(torques(['carrier'], [1], 2 * 10**18))
     publisher.publish(torques(['carrier'], [2], 10**9))
-    ros.until(lambda: node._inputs.refused == 1)
+    ros.until(lambda: node._inputs.refused == 1 and joints)
     assert [message.effort[0] for message in joints] == [1.0]
     ros.call(Trigger, '/differential/reset')
     publisher.publish(torques(['carrier'], [3], 10**9))
@@ -174,71 +166,71 @@ def test_without_any_input_it_stays_at_rest_and_says_so(ros):
     assert node.simulation.snapshot().power_flow == 1
 
 
-def test_an_input_that_stops_is_stale_and_one_that_comes_back_is_not(ros):
-    node = ros.differential(torque_timeout=0.2)
+def test_an_input_that_stops_is_stale_and_one_that_comes_back_is_not(ros, steady):
+    node = ros.differential(rate=200.0, torque_timeout=0.2)
     diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
     publisher = ros.publisher(Float64, '/differential/torque/left')
 
-    def torque():
+    def torque_after_ticks(count):
+        for _ in range(count):
+            steady.tick(node)
         return node.simulation.snapshot().torque[1]
 
     publisher.publish(Float64(data=5.0))
-    ros.until(lambda: torque() == 5.0)
-    ros.until(lambda: torque() == 0.0)
+    ros.until(lambda: torque_after_ticks(1) == 5.0)
+    assert torque_after_ticks(40) == 5.0
+    assert torque_after_ticks(1) == 0.0
     ros.until(lambda: told(diagnostics, 'torques')[2].get('stale') == 'left')
     level, message, _ = told(diagnostics, 'torques')
     assert level == DiagnosticStatus.WARN and 'too old' in message
-
-    def back():
-        publisher.publish(Float64(data=6.0))
-        return torque() == 6.0 and told(diagnostics, 'torques')[:2] == (
-            DiagnosticStatus.OK, 'fine')
-    ros.until(back)
+    publisher.publish(Float64(data=6.0))
+    ros.until(lambda: torque_after_ticks(1) == 6.0)
+    ros.until(lambda: told(diagnostics, 'torques')[:2] == (DiagnosticStatus.OK, 'fine'))
 
 
 # Subscribers that do not listen
 
 
-def ticks_in(ros, node, seconds):
-    """Return how many ticks a node makes in so many periods of its own clock."""
-    ticks, end = node._pacer.ticks, time.monotonic() + seconds
-    ros.until(lambda: time.monotonic() > end)
-    return node._pacer.ticks - ticks
-
-
 @pytest.mark.parametrize('reliability', ['RELIABLE', 'BEST_EFFORT'])
-def test_a_stopped_and_a_slow_subscriber_hold_no_tick_up(ros, listeners, reliability):
+def test_a_stopped_and_a_slow_subscriber_hold_no_tick_up(ros, steady, listeners, reliability):
     node = ros.differential(rate=500.0)
     stopped, slow = listeners(reliability, 0.0), listeners(reliability, 0.2)
-    reader = [p.stdout.readline() for p in (stopped, slow)]
-    assert reader == ['heard\n'] * 2
-    before = ticks_in(ros, node, 1.0)
+
+    def both_hear():
+        steady.tick(node)
+        return all('heard' in process.output for process in (stopped, slow))
+    ros.until(both_hear)
     stopped.send_signal(signal.SIGSTOP)
-    ros.until(lambda: node._pacer.ticks > before + 500)   # far more than any queue holds
-    # a publisher that waits, does so for 0.1 s a message: that would leave 2 % of the ticks
-    ros.until(lambda: ticks_in(ros, node, 1.0) > 0.9 * before)
+    # far more than any queue holds; a publisher that waits, does so for 0.1 s a message
+    ticks = node.simulation.ticks + 1000
+    steady.passes(1000 / 500)
+    ros.until(lambda: node.simulation.ticks == ticks)
+    assert node._pacer.missed == 0
 
 
 def test_in_lockstep_a_stopped_subscriber_holds_no_tick_up_even_when_its_queue_is_full(
-        ros, listeners):
-    node = ros.differential('lsd_ode', mode='lockstep')
+        ros, listeners, monkeypatch):
+    assert LOCKSTEP_OUTPUT_QOS.depth == 10_000   # in full in test/long
+    monkeypatch.setattr('dm_ros.ros.node.LOCKSTEP_OUTPUT_QOS', QoSProfile(depth=500))
+    fill_the_queue_of_a_stopped_subscriber(ros, listeners, 500)
+
+
+def fill_the_queue_of_a_stopped_subscriber(ros, listeners, depth):
+    """Make ticks in lockstep, far more than the queue of the node for a subscriber holds."""
+    differential = ros.differential('lsd_ode', mode='lockstep')
     stopped = listeners('RELIABLE', 0.0)
-    publisher = ros.publisher(JointState, TORQUES)
+    publisher = ros.publisher(JointState, TORQUES, depth=2000)
     message = torques(['carrier'], [1.0])
-    ros.until(lambda: node._joint_states.get_subscription_count() == 1)
+    ros.until(differential.is_connected)
     publisher.publish(message)
-    assert stopped.stdout.readline() == 'heard\n'
+    stopped.says('heard')
     stopped.send_signal(signal.SIGSTOP)
     sent = 1
-    while sent < 10_500:   # the queue of the node holds 10,000
-        for _ in range(100):
+    while sent < depth + 1000:
+        for _ in range(500):
             publisher.publish(message)
-        sent += 100
-        end = time.monotonic() + 20.0
-        while node.simulation.ticks < sent - 5:
-            assert time.monotonic() < end
-            time.sleep(0.001)
-    ros.until(lambda: node.simulation.ticks == sent)
+        sent += 500
+        ros.until(lambda sent=sent: differential.simulation.ticks == sent)
 
 
 # Peers that do not fit
@@ -277,8 +269,7 @@ def test_a_publisher_that_does_not_offer_what_lockstep_needs_is_named_until_it_g
     QoSProfile(depth=50)])
 def test_in_real_time_torques_of_every_qos_are_heard(ros, profile):
     node = ros.differential(torque_timeout=0.0)
-    publisher = ros.node.create_publisher(JointState, TORQUES, profile)
-    ros.until(lambda: publisher.get_subscription_count() > 0)
+    publisher = ros.publisher(JointState, TORQUES, profile)
 
     def heard():
         publisher.publish(torques(['left'], [4.0]))
@@ -322,20 +313,25 @@ def test_numbers_at_the_edge_of_what_is_allowed_are_refused_or_borne(ros, varian
     assert all(map(math.isfinite, (*joints[-1].velocity, *joints[-1].position)))
 
 
-def test_a_change_in_the_middle_of_a_locked_clutch_leaves_it_locked_and_moves_no_shaft(ros):
+def test_a_change_in_the_middle_of_a_locked_clutch_leaves_it_locked_and_moves_no_shaft(
+        ros, steady):
     node = ros.differential('lsd_ode', torque_timeout=0.0)
-    joints = ros.listen(JointState, JOINTS, depth=5000)
+    joints = ros.listen(JointState, JOINTS)
     ros.publisher(JointState, TORQUES).publish(
         torques(('carrier', 'front', 'rear'), (100, -38, -58)))
-    ros.until(lambda: joints and joints[-1].velocity[0] > 5.0)
+
+    def turns():
+        steady.tick(node, joints)
+        return joints[-1].velocity[0] > 5.0
+    ros.until(turns)
     for preload in (60.0, 100.0, 80.0):
         results = ros.call(SetParameters, '/differential/set_parameters', parameters=[
             Parameter(name, value=value).to_parameter_msg() for name, value in (
                 ('lsd.clutch.rear.preload', preload),
                 ('lsd.clutch.front.friction_coefficient', preload / 1000))]).results
         assert all(result.successful for result in results)
-        count = len(joints)
-        ros.until(lambda count=count: len(joints) > count + 20)
+        for _ in range(20):
+            steady.tick(node, joints)
     speeds = [message.velocity for message in joints if message.effort[0] == 100.0]
     assert all(abs(front - rear) < 0.1 for _, front, rear, _ in speeds)
     # the torques alone make 0.33 rad/s in a tick

@@ -3,33 +3,24 @@
 
 """``play_torques`` over real topics, as a process of its own."""
 
+from contextlib import ExitStack
 import signal
-import subprocess
-import sys
 
+from processes import command, Forked
 import pytest
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from dm_ros.mechanism.variants import MECHANISMS
-
-TOOL = [sys.executable, '-m', 'dm_ros.tools.play_torques']
+from dm_ros.tools.play_torques import load, parser
 
 
 @pytest.fixture
 def play(ros):
     """Return a function that starts the tool and returns the process, ended after the test."""
-    processes = []
-
-    def play(*arguments):
-        process = subprocess.Popen([*TOOL, *map(str, arguments)], stderr=subprocess.PIPE,
-                                   text=True)
-        processes.append(process)
-        return process
-    yield play
-    for process in processes:
-        process.kill()
-        process.communicate()
+    with ExitStack() as stack:
+        yield lambda *arguments: stack.enter_context(
+            Forked(command('tools.play_torques'), *arguments))
 
 
 def listen(ros, topic='/differential/torques'):
@@ -46,12 +37,11 @@ def listen(ros, topic='/differential/torques'):
 def test_plays_a_built_in_load_and_ends_with_zero(ros, play, arguments, profile, names):
     messages = listen(ros)
     process = play(*arguments, '--rate', 200, '--duration', 0.5, '--wait', 60)
-    ros.until(lambda: process.poll() is not None)
+    ros.until(lambda: process.returncode is not None)
     ros.until(lambda: messages and not any(messages[-1].effort))
     assert process.returncode == 0
     *played, last = messages
-    load = MECHANISMS[profile].load
-    expected = [list(load(n / 200)) for n in range(100)]
+    expected = [list(MECHANISMS[profile].load(n / 200)) for n in range(100)]
     # a machine that is late skips messages, so not every one of the hundred must be there
     assert len(played) <= 100 and list(played[0].effort) == expected[0]
     assert all(list(message.effort) in expected for message in played)
@@ -60,15 +50,22 @@ def test_plays_a_built_in_load_and_ends_with_zero(ros, play, arguments, profile,
 
 
 def test_plays_a_file_to_its_end(ros, play, tmp_path):
+    rows = [(float(n), n + 0.25, n + 0.5) for n in range(1, 31)]   # pinion, left, right
     file = tmp_path / 'torques.csv'
-    file.write_text('right,time,left,pinion\n3,0,2,1\n6,0.3,5,4\n9,0.6,8,7\n')
+    file.write_text('right,time,left,pinion\n' + ''.join(
+        f'{right},{n / 50},{left},{pinion}\n' for n, (pinion, left, right) in enumerate(rows)))
+    arguments = ['--torques', str(file), '--wait', '60']
+    _, torques_at, count = load(parser().parse_args(arguments))
+    assert [torques_at(n) for n in range(count)] == [row for row in rows[:-1] for _ in range(2)]
     messages = listen(ros)
-    process = play('--torques', file, '--wait', 60)
-    ros.until(lambda: process.poll() is not None)
+    process = play(*arguments)
+    ros.until(lambda: process.returncode is not None)
     ros.until(lambda: messages and not any(messages[-1].effort))
     assert process.returncode == 0
-    efforts = [tuple(message.effort) for message in messages]
-    assert list(dict.fromkeys(efforts)) == [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.0, 0.0, 0.0)]
+    *played, last = dict.fromkeys(tuple(message.effort) for message in messages)
+    # a machine that is late passes rows over
+    assert played[0] == rows[0] and played == [row for row in rows[:-1] if row in played]
+    assert last == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
@@ -76,9 +73,7 @@ def test_a_signal_unloads_and_ends_cleanly(ros, play, number):
     messages = listen(ros)
     process = play('--wait', 60)
     ros.until(lambda: len(messages) > 5)
-    process.send_signal(number)
-    _, errors = process.communicate(timeout=20)
-    assert process.returncode == 0 and 'Traceback' not in errors
+    assert process.ended(number) == 0 and 'Traceback' not in process.errors
     ros.until(lambda: not any(messages[-1].effort))
 
 
@@ -93,9 +88,8 @@ def test_the_topic_can_be_chosen(ros, play, arguments):
 
 def test_without_a_subscriber_it_warns_and_plays_all_the_same(ros, play):
     process = play('--wait', 0.1, '--duration', 0.1)
-    _, errors = process.communicate(timeout=20)
-    assert process.returncode == 0
-    assert '/differential/torques has no subscriber' in errors
+    assert process.ended() == 0
+    assert '/differential/torques has no subscriber' in process.errors
 
 
 def test_drives_the_node(ros, play):
@@ -116,7 +110,7 @@ def test_drives_the_node(ros, play):
     (['--ros-args', '--what'], '--what')])
 def test_bad_arguments_end_it_with_one_line(play, arguments, part):
     process = play('--wait', 0, '--duration', 0.1, *arguments)
-    _, errors = process.communicate(timeout=20)
-    *usage, error = errors.splitlines()
-    assert process.returncode == 2 and part in error
+    assert process.ended() == 2
+    *usage, error = process.errors.splitlines()
+    assert part in error
     assert not usage or usage[0].startswith('usage:')
