@@ -209,8 +209,9 @@ class Tally:
         self.fullest = 0.0    # speeds, or energy, over what may be
 
     def __str__(self):
-        return (f'{self.loss_law}: {self.cases} cases, {self.ticks} ticks, {self.coarse_steps} coarse steps in '
-                f'{self.coarse_cases} cases, worst constraint residual {self.residual:.1e} of '
+        return (f'{self.loss_law}: {self.cases} cases, {self.ticks} ticks, '
+                f'{self.coarse_steps} coarse steps in {self.coarse_cases} cases, '
+                f'worst constraint residual {self.residual:.1e} of '
                 f'its largest term, up to {self.fullest:.6f} of what energy allows')
 
     def run(self, n):
@@ -360,6 +361,7 @@ def check_state(rng, symmetric):
 
 
 PERIOD, DT = 1000, 0.01   # ticks of a load, s
+ANGLE_ERROR = 5e-5        # trapezoids cut the corners where a shaft turns round
 
 
 def steady_load(variant, kind):
@@ -391,14 +393,14 @@ class Endured(NamedTuple):
     coarse_steps: int
 
 
-def endure(variant, kind, settle, periods):
+def endure(variant, kind, settle, periods, loss_law=PASSIVE):
     """
     Repeat a load at 100 Hz for some periods and return what it came to.
 
     When it has settled, the speeds over one period are summed by trapezoids: the angles of all
     periods from then on should be that sum, as often as there were periods.
     """
-    simulation, load = Simulation(variant, DT), steady_load(variant, kind)
+    simulation, load = Simulation(variant, DT, loss_law=loss_law), steady_load(variant, kind)
     g = constraints(variant, simulation.parameters)
     residual, turn, start = 0.0, None, None
     for period in range(periods):

@@ -179,7 +179,7 @@ def test_efficiencies_cost_power_where_the_driving_side_drives(direction):
 class Printed30(SymmetricOde):
     def efficiencies(self, direction):
         *others, eta_l = super().efficiencies(direction)
-        if direction == 1:
+        if direction != -1:
             eta_l[0, 1:3] /= self.p.eta_1G, self.p.eta_2G
         return *others, eta_l
 
