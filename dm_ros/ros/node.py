@@ -6,7 +6,6 @@
 import argparse
 import gc
 import os
-import signal
 import sys
 import threading
 import time
@@ -25,6 +24,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int8
 from std_srvs.srv import SetBool, Trigger
 
+from dm_ros.ending import run_command
 from dm_ros.mechanism.variants import variant_named
 from dm_ros.motion.energy import AuditedSimulation
 from dm_ros.motion.held_inputs import HeldInputs
@@ -374,47 +374,56 @@ def parser():
         'differential', description=HELP, formatter_class=argparse.RawDescriptionHelpFormatter)
 
 
-def main(args=None):
-    """Run the node until SIGINT or SIGTERM; return the exit code."""
-    args = sys.argv if args is None else ['differential', *args]
-    signals = (signal.SIGINT, signal.SIGTERM)
-    ended = threading.Event()
-    for number in signals:
-        signal.signal(number, lambda *_: ended.set())
+class CannotStart(Exception):
+    """Why there is no node: a wrong command line, or something wrong around it."""
+
+
+def started(args):
+    """Return the node; raise ``CannotStart`` where there can be none."""
     if 'HOME' not in os.environ and (home := os.path.expanduser('~')) != '~':
         os.environ['HOME'] = home   # where rclpy has its logs
-    node = None
     try:
         parser().parse_args(remove_ros_args(args)[1:])
         remove_leftovers()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = DifferentialNode()
+        return DifferentialNode()
+    except (ValueError, ParameterException, RuntimeError) as error:
+        # RuntimeError: of rclpy, such as an unwritable folder for its logs
+        raise CannotStart(error) from error
+
+
+def run(args, ended):
+    """Run the node until a signal has set ``ended``."""
+    node = None
+    try:
+        node = started(args)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         gc.collect()
         gc.freeze()   # a full collection takes tens of ms; this leaves it little to look at
         sys.setswitchinterval(SWITCH_INTERVAL)
-        # these call those above and shut the context down, which breaks whatever uses it
+        # these call those that set it and shut the context down, which breaks whatever uses it
         install_signal_handlers()
         if not ended.is_set():
             node.start()
             executor.spin()
     except ExternalShutdownException:
         pass
-    except Exception as error:
-        if ended.is_set():
-            return 0
-        if node or not isinstance(error, (ValueError, ParameterException, RuntimeError)):
+    except Exception:
+        if not ended.is_set():
             raise
-        print('differential: error:', ' '.join(str(error).split()), file=sys.stderr)
-        return 2   # RuntimeError: of rclpy, such as an unwritable folder for its logs
     finally:
         if node:
             node.close()
         rclpy.try_shutdown()
-        for number in signals:
-            signal.signal(number, signal.SIG_IGN)
-    return 0
+
+
+def main(args=None):
+    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    args = sys.argv if args is None else ['differential', *args]
+    ended = threading.Event()
+    return run_command('differential', lambda: run(args, ended), expected=(CannotStart,),
+                       on_signal=lambda *_: ended.set(), until_signal=True)
 
 
 if __name__ == '__main__':

@@ -7,11 +7,11 @@ import argparse
 import math
 import sys
 
+from dm_ros.ending import run_command
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.mechanism.bias import torque_bias
 from dm_ros.mechanism.parameters import SelfLockingParameters
 from dm_ros.mechanism.power_flow import DIRECT
-from dm_ros.tools.ending import run_tool
 
 
 def sentence(p, torque, direction=DIRECT):
@@ -57,7 +57,7 @@ def run(arguments):
 def main(args=None):
     """Run the tool ``bias`` and return its exit code."""
     arguments = parser().parse_args(args)
-    return run_tool('bias', lambda: run(arguments), 'stdout')
+    return run_command('bias', lambda: run(arguments))
 
 
 if __name__ == '__main__':

@@ -9,6 +9,7 @@ from math import inf
 import os
 import sys
 
+from dm_ros.ending import run_command
 from dm_ros.files.output import replacing
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.plot import require_matplotlib
@@ -27,7 +28,6 @@ from dm_ros.tools.comparison.runs import (
     run,
     ticks_of,
 )
-from dm_ros.tools.ending import run_tool
 from dm_ros.tools.progress import progress
 
 TABLE_SECONDS = 30.0   # of a CSV, without --duration
@@ -138,7 +138,7 @@ def compare(arguments):
 def main(args=None):
     """Run the tool ``compare_variants`` and return its exit code."""
     arguments = parser().parse_args(args)
-    return run_tool('compare_variants', lambda: compare(arguments), arguments.out)
+    return run_command('compare_variants', lambda: compare(arguments), arguments.out)
 
 
 if __name__ == '__main__':

@@ -17,6 +17,7 @@ import subprocess
 import sys
 import time
 
+from dm_ros.ending import run_command
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.ros.domain import own_domain
 from dm_ros.ros.recorder import Recorder
@@ -130,31 +131,27 @@ def report(record, missed, rate):
     return lines
 
 
+def run(arguments):
+    """Do what the command line says; raise OSError, RuntimeError or ValueError where it fails."""
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with own_domain() as domain:
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
+        recorder = run_processes(arguments)
+    record = recorder.record(arguments.duration, f'{arguments.variant} at {arguments.rate:g} Hz')
+    csv = arguments.out / f'{arguments.variant}.csv'
+    png = arguments.out / f'{arguments.variant}.png'
+    record.save_csv(csv)
+    record.save_plot(png)
+    print('\n'.join(report(record, recorder.missed, arguments.rate)))
+    print(f'\nwritten       {csv}\n              {png}')
+
+
 def main(args=None):
     """Run the demo; return the exit code."""
     arguments = parser().parse_args(args)
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    # a SIGTERM ends the processes as well
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    try:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        with own_domain() as domain:
-            os.environ['ROS_DOMAIN_ID'] = str(domain)
-            recorder = run_processes(arguments)
-        record = recorder.record(arguments.duration,
-                                 f'{arguments.variant} at {arguments.rate:g} Hz')
-        csv = arguments.out / f'{arguments.variant}.csv'
-        png = arguments.out / f'{arguments.variant}.png'
-        record.save_csv(csv)
-        record.save_plot(png)
-    except KeyboardInterrupt:
-        return 128 + signal.SIGINT
-    except (OSError, RuntimeError, ValueError) as error:
-        print(f'demo: {error}', file=sys.stderr)
-        return 1
-    print('\n'.join(report(record, recorder.missed, arguments.rate)))
-    print(f'\nwritten       {csv}\n              {png}')
-    return 0
+    return run_command('demo', lambda: run(arguments), str(arguments.out),
+                       expected=(OSError, RuntimeError, ValueError), code=1)
 
 
 if __name__ == '__main__':

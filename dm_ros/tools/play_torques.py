@@ -4,7 +4,6 @@
 """Publish torques to a differential node: a built-in load, or a CSV file."""
 
 import argparse
-import signal
 import sys
 import time
 
@@ -16,6 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 
+from dm_ros.ending import ignore_signals, run_command
 from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS
 from dm_ros.tools.progress import progress
@@ -136,33 +136,30 @@ def load(arguments):
     return mechanism.inputs, torques_at, count
 
 
-def main(args=None):
-    """Run the tool ``play_torques`` and return its exit code."""
-    args = sys.argv if args is None else ['play_torques', *args]
-    # rclpy's own handlers would shut down before the zero torques are out
-    signals = (signal.SIGINT, signal.SIGTERM)
-    for number in signals:
-        signal.signal(number, signal.default_int_handler)
+def run(args):
+    """Play what the command line says, and unload in the end."""
     player = None
     try:
         arguments = parser().parse_args(remove_ros_args(args)[1:])
         inputs, torques_at, count = load(arguments)
+        # rclpy's own handlers would shut down before the zero torques are out
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         player = Player(rclpy.create_node('play_torques'), arguments.node, inputs)
         player.wait(arguments.wait)
         player.play(torques_at, arguments.rate, count)
-    except KeyboardInterrupt:
-        pass
-    except (ValueError, RuntimeError, NameValidationException) as error:  # RuntimeError: rclpy
-        print('play_torques: error:', ' '.join(str(error).splitlines()), file=sys.stderr)
-        return 2
     finally:
-        for number in signals:
-            signal.signal(number, signal.SIG_IGN)
+        ignore_signals()
         if player:
             player.unload()
         rclpy.try_shutdown()
-    return 0
+
+
+def main(args=None):
+    """Run the tool ``play_torques`` and return its exit code."""
+    args = sys.argv if args is None else ['play_torques', *args]
+    return run_command(
+        'play_torques', lambda: run(args), until_signal=True,
+        expected=(ValueError, RuntimeError, NameValidationException))   # RuntimeError: of rclpy
 
 
 if __name__ == '__main__':

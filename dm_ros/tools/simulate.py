@@ -12,6 +12,7 @@ import sys
 
 import numpy as np
 
+from dm_ros.ending import run_command
 from dm_ros.files.columns import as_row, column_names, write_csv
 from dm_ros.files.output import replacing
 from dm_ros.files.parameter_file import read_parameter_file
@@ -21,7 +22,6 @@ from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.settings import make_simulation, NodeParameters
-from dm_ros.tools.ending import run_tool
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
@@ -119,7 +119,7 @@ def main(args=None):
     """Run the tool ``simulate`` and return its exit code."""
     arguments = parser().parse_args(args)
     outputs = [path for path in (arguments.out, arguments.plot) if path] or ['stdout']
-    return run_tool('simulate', lambda: run(arguments), ', '.join(outputs))
+    return run_command('simulate', lambda: run(arguments), ', '.join(outputs))
 
 
 if __name__ == '__main__':

@@ -1,0 +1,91 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""How commands end: exit codes, one line for what is expected, quiet for a signal."""
+
+import os
+from pathlib import Path
+import re
+import signal
+
+import pytest
+
+from dm_ros.ending import run_command, SIGNALS
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(autouse=True)
+def handlers():
+    """Give the signals back as they were, and have SIGINT as in the foreground."""
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def failing(error):
+    """Return work that fails."""
+    def work():
+        raise error
+    return work
+
+
+@pytest.mark.parametrize('error, line', [
+    (ValueError('rate: 0\n  is not allowed'), 'tool: error: rate: 0 is not allowed\n'),
+    (OSError(28, 'No space left on device', 'a.csv'),
+     'tool: error: a.csv: No space left on device\n'),
+    (OSError(28, 'No space left on device'), 'tool: error: out: No space left on device\n'),
+    (OSError('every domain is in use'), 'tool: error: every domain is in use\n')])
+def test_what_is_expected_is_one_line_and_its_code(error, line, capsys):
+    assert run_command('tool', failing(error), 'out') == 2
+    assert run_command('tool', failing(error), 'out', code=1) == 1
+    assert capsys.readouterr() == ('', line * 2)
+
+
+def test_what_is_not_expected_is_a_fault_of_the_command():
+    with pytest.raises(KeyError):
+        run_command('tool', failing(KeyError('x')))
+    with pytest.raises(ValueError):
+        run_command('tool', failing(ValueError('x')), expected=(RuntimeError,))
+
+
+def test_a_pager_that_was_left_is_no_error(capsys):
+    assert run_command('tool', failing(BrokenPipeError(32, 'Broken pipe'))) == 141
+    assert capsys.readouterr() == ('', '')
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('until_signal', [False, True])
+def test_a_signal_ends_the_work_quietly_and_a_second_one_not_its_tidying_up(
+        number, until_signal, capsys):
+    tidied = []
+
+    def work():
+        try:
+            os.kill(os.getpid(), number)
+        finally:
+            os.kill(os.getpid(), number)
+            tidied.append(True)
+    assert run_command('tool', work, until_signal=until_signal) == (
+        0 if until_signal else 128 + number)
+    assert tidied and capsys.readouterr() == ('', '')
+    if until_signal:   # nothing disturbs the end of the interpreter
+        assert signal.getsignal(number) == signal.SIG_IGN
+
+
+def test_handlers_are_given_back_and_what_a_shell_lets_it_ignore_stays_ignored():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = [signal.getsignal(number) for number in SIGNALS]
+    assert run_command('tool', lambda: os.kill(os.getpid(), signal.SIGINT)) == 0
+    assert [signal.getsignal(number) for number in SIGNALS] == before
+
+
+def test_every_command_ends_so():
+    commands = re.findall(r"'\w+ = dm_ros\.([\w.]+):main'", (ROOT / 'setup.py').read_text())
+    assert len(commands) > 5
+    for module in commands:
+        # command.py is what answers to signals while the node loads
+        path = ROOT / 'dm_ros' / (module.replace('.', '/').replace('command', 'node') + '.py')
+        assert path.read_text().count('return run_command(') == 1, path
