@@ -179,7 +179,8 @@ def round_trips(shaft, index, path):
     from sensor_msgs.msg import JointState
     from std_msgs.msg import Float64
 
-    from dm_ros.ros.messages import never_called, poll, Polled
+    from dm_ros.ros.messages import never_called, Polled
+    from dm_ros.ros.privates import poll
     rclpy.init()
     me = rclpy.create_node('round_trips')
     states = me.create_subscription(JointState, '/differential/joint_states', never_called, 100,

@@ -302,7 +302,7 @@ class NodeMachine(RuleBasedStateMachine):
     def request(self, changed):
         from rcl_interfaces.srv import SetParameters
         from rclpy.parameter import Parameter
-        return self.node._parameter_services._set_parameters_callback(
+        return self.node._parameter_services.set_parameters(
             SetParameters.Request(parameters=[
                 Parameter(name, value=value).to_parameter_msg()
                 for name, value in changed.items()]), SetParameters.Response()).results

@@ -4,6 +4,7 @@
 """The rooms of the package: who may use whom, and who may know ROS."""
 
 import ast
+import importlib
 import os
 from pathlib import Path
 import subprocess
@@ -16,6 +17,8 @@ FLOORS = [   # from the ground up; a file of the package itself is a room of its
     {'mechanism', 'ending'}, {'motion'}, {'settings'}, {'files'}, {'ros'}, {'tools', 'testing'},
     {'__init__', 'bias', 'energy'}]
 KNOW_ROS = {'ros', 'tools', 'testing'}
+PRIVATES = ROOT / 'ros' / 'privates.py'
+INNER = {'handle', 'impl', 'take_message', 'WaitSet', 'ParameterService'}   # names within rclpy
 FILES = sorted(ROOT.rglob('*.py'))
 
 
@@ -104,3 +107,48 @@ def test_no_file_imports_itself_through_others():
         for path in leaves:
             del graph[path]
     assert not graph, sorted(map(str, graph))
+
+
+def reached_into(path):
+    """Return what a file touches that belongs to another: its private names, or inner ones."""
+    tree = ast.parse(path.read_text())
+    mine = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    found = {part for name in imports(path) for part in name.split('.')
+             if part in INNER or part.startswith('_') and not part.startswith('__')}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Attribute):
+            continue
+        if isinstance(node.ctx, ast.Store) and ast.unparse(node.value) == 'self':
+            mine.add(node.attr)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            private = node.attr.startswith('_') and not node.attr.startswith('__')
+            own = ast.unparse(node.value) == 'self' and node.attr in mine
+            if node.attr in INNER or private and not own:
+                found.add(node.attr)
+    return found
+
+
+def test_no_file_but_one_touches_private_parts_of_rclpy():
+    assert reached_into(PRIVATES) >= {
+        '_parameter_overrides', 'take_message', 'impl', 'WaitSet', '_get_node'}
+    others = [path for path in FILES if room(path) in KNOW_ROS and path != PRIVATES]
+    assert len(others) > 15
+    # os._exit is public, whatever its name
+    assert not {path.name: names for path in others if (names := reached_into(path) - {'_exit'})}
+
+
+def test_no_class_but_one_overrides_private_parts_of_rclpy():
+    pytest.importorskip('rclpy')
+    overriding = set()
+    for path in FILES:
+        if room(path) != 'ros':
+            continue
+        for found in vars(importlib.import_module(module(path))).values():
+            if isinstance(found, type) and found.__module__ == module(path):
+                inherited = {name for base in found.mro() if base.__module__.startswith('rclpy')
+                             for name in vars(base)}
+                if [name for name in inherited & vars(found).keys()
+                        if name.startswith('_') and not name.startswith('__')]:
+                    overriding.add(path)
+    assert overriding == {PRIVATES}

@@ -7,7 +7,7 @@ import os
 import threading
 import time
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from dm_ros.ros.privates import take, Waiter
 
 SPIN = 50_000           # ns before a deadline that are not slept but watched
 LOOK = 0.5e-3           # s between two looks at a clock that another simulator drives
@@ -78,19 +78,15 @@ def follow_ros_clock(control, pacer, clock, tick):
 
 def follow_messages(control, subscription, context, tick):
     """Call ``tick(message)`` for each message of a polled subscription, in their order."""
-    wait_set = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, context.handle)
-    handle = subscription.handle
+    waiter = Waiter(subscription, context)
     while not control.stopping.is_set():
         if not control.running.wait(LONGEST_WAIT):
             continue
-        wait_set.clear_entities()
-        wait_set.add_subscription(handle)
-        wait_set.wait(int(LONGEST_WAIT * 1e9))
+        waiter.wait(LONGEST_WAIT)
         taken = True
         while taken and not control.stopping.is_set():
-            with control.lock, handle:
+            with control.lock:
                 # what is not taken while paused stays in the queue
-                taken = control.running.is_set() and handle.take_message(
-                    subscription.msg_type, False)
+                taken = control.running.is_set() and take(subscription)
                 if taken:
                     tick(taken[0])

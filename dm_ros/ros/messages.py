@@ -21,7 +21,7 @@ LOCKSTEP_OUTPUT_QOS = QoSProfile(depth=10_000)
 
 
 class Polled(CallbackGroup):
-    """A group for subscriptions that no executor serves: ``poll`` takes their messages."""
+    """A group for subscriptions that no executor serves, see ``poll`` of ``privates``."""
 
     def can_execute(self, entity):
         return False
@@ -35,17 +35,6 @@ class Polled(CallbackGroup):
 
 def never_called(message):
     """Stand in for the callback of a polled subscription."""
-
-
-def poll(subscription):
-    """Yield ``(message, info)`` for all that a polled subscription holds now."""
-    handle = subscription.handle
-    with handle:
-        while True:
-            taken = handle.take_message(subscription.msg_type, False)
-            if taken is None:
-                return
-            yield taken
 
 
 class SnapshotMessages:

@@ -46,12 +46,12 @@ from dm_ros.ros.messages import (
     LOCKSTEP_OUTPUT_QOS,
     never_called,
     OUTPUT_QOS,
-    poll,
     Polled,
     SHARED_QOS,
     SnapshotMessages,
 )
-from dm_ros.ros.parameters import declare, given_parameters, WholeRequests
+from dm_ros.ros.parameters import declare, strictly_checked
+from dm_ros.ros.privates import given_parameters, poll, WholeRequests
 from dm_ros.settings import known_rows, NodeParameters
 
 SWITCH_INTERVAL = 1e-4   # s that the loop waits at most for a service to let go of the interpreter
@@ -125,7 +125,7 @@ class DifferentialNode(Node):
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_service(SetBool, '~/pause', self._pause)
         self.create_service(Trigger, '~/step', self._step)
-        self._parameter_services = WholeRequests(self)
+        self._parameter_services = WholeRequests(self, strictly_checked)
         # the steady clock: a timer of the ROS clock stalls when system time steps back
         self.create_timer(1.0, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
         log = self.get_logger()

@@ -1,13 +1,11 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The tables of parameters as ROS 2 parameters: declared, described, changed as a whole."""
+"""The tables of parameters as ROS 2 parameters: declared, described, checked."""
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.parameter import Parameter
-from rclpy.parameter_service import ParameterService
 
+from dm_ros.ros.privates import given_parameters
 from dm_ros.settings import known_rows
 
 
@@ -43,38 +41,7 @@ def declare(node, parameters, wanted=lambda name: True):
     return started
 
 
-def given_parameters(node):
-    """Return ``{name: value}`` of what the command line and files give to a node."""
-    return {name: p.value for name, p in node._parameter_overrides.items()}
-
-
-class WholeRequests(ParameterService):
-    """
-    The parameter services of a node, with ``set_parameters`` all or nothing.
-
-    ROS 2 takes the parameters of such a request one by one. Those of a mechanism belong
-    together: what is impossible halfway may be fine at the end, and the other way round.
-    """
-
-    def _set_parameters_callback(self, request, response):
-        whole = self._set_parameters_atomically_callback(
-            SetParametersAtomically.Request(parameters=request.parameters),
-            SetParametersAtomically.Response())
-        response.results = [whole.result] * len(request.parameters)
-        return response
-
-    def _set_parameters_atomically_callback(self, request, response):
-        try:
-            for message in request.parameters:
-                self._check(message)
-        except ValueError as error:   # rclpy does not always name the parameter
-            response.result.reason = str(error)
-            return response
-        return super()._set_parameters_atomically_callback(request, response)
-
-    def _check(self, message):
-        if not self._get_node().has_parameter(message.name):
-            raise ValueError(f'{message.name}: there is no such parameter')
-        if message.name in known_rows():
-            value = Parameter.from_parameter_msg(message).value
-            known_rows()[message.name].strictly_checked(message.name, value)
+def strictly_checked(name, value):
+    """Check a value for a parameter, with the types of ROS 2; raise ValueError as ``declare``."""
+    if name in known_rows():
+        known_rows()[name].strictly_checked(name, value)

@@ -12,7 +12,8 @@ from std_msgs.msg import Int8
 
 from dm_ros.files.record import Record
 from dm_ros.mechanism.variants import variant_named
-from dm_ros.ros.messages import never_called, poll, Polled
+from dm_ros.ros.messages import never_called, Polled
+from dm_ros.ros.privates import poll
 
 DEEP_QOS = QoSProfile(depth=5000)
 
