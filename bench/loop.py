@@ -127,7 +127,7 @@ def node(rate, variant, path):
     differential = DifferentialNode(parameter_overrides=[
         Parameter('variant', value=variant), Parameter('rate', value=float(rate))])
     timeline = Timeline(path)
-    differential._pacer = watched_pacer(rate, timeline)
+    differential.pacer = watched_pacer(rate, timeline)
     executor = SingleThreadedExecutor()
     executor.add_node(differential)
     sys.setswitchinterval(SWITCH_INTERVAL)   # as main() of the node does

@@ -4,18 +4,18 @@
 """
 Machines that do at random what users do to a differential, good and bad, in any order.
 
-``CoreMachine``  the core as the node uses it: ``Simulation``, ``HeldInputs``, the tables
-``NodeMachine``  a ``DifferentialNode`` in lockstep, by its own callbacks and real publishers
+``CoreMachine``  the core as the node uses it: a ``Plant``
+``NodeMachine``  a ``DifferentialNode`` in lockstep, by its public methods and real publishers
 
 A sequence is one life of a machine. After each of its steps the laws of ``Laws`` hold.
 """
 
 from contextlib import contextmanager, ExitStack
 from copy import deepcopy
-import dataclasses
 import math
 import os
 import time
+from types import SimpleNamespace
 from unittest.mock import patch
 
 from hypothesis import HealthCheck, seed, settings
@@ -31,17 +31,17 @@ from hypothesis.stateful import (
 import numpy as np
 from properties import constraints
 
-from dm_ros import Simulation, VARIANTS
+from dm_ros import VARIANTS
 from dm_ros.energy import AuditedSimulation
-from dm_ros.mechanism.variants import MECHANISMS
-from dm_ros.motion.held_inputs import HeldInputs
+from dm_ros.mechanism.variants import MECHANISMS, variant_named
+from dm_ros.plant import Plant
 from dm_ros.settings import NodeParameters
 from dm_ros.tools.progress import progress
 
 ROUNDING = 1e-13   # of the largest term of a constraint, also after many changes of parameters
 SUBNORMAL = 1e-300
 STAMPS = ('none', 'none', 'none', 'next', 'next', 'same', 'old', 'far', 'below')
-KINDS = (Simulation, AuditedSimulation)   # the node runs the latter
+SILENT = SimpleNamespace(warning=lambda words: None, info=lambda words: None)
 STEPS = 12         # in a sequence, at most
 CHUNK = 1000       # sequences from one seed
 
@@ -62,6 +62,12 @@ def as_demanded(shafts, names, torques):
     """Return whether a demand is to be taken."""
     return (len(names) == len(torques) == len(set(names)) and set(names) <= set(shafts)
             and all(map(math.isfinite, torques)))
+
+
+def stamp_of(which, last):
+    """Return one of the ``STAMPS``, ns, of those that a message can hold."""
+    return min({'none': 0, 'next': last + 1, 'same': last, 'old': last // 2, 'far': last + 10**17,
+                'below': -10**9}[which], (2**31 - 1) * 10**9)
 
 
 def values(entry, default):
@@ -132,7 +138,7 @@ class Laws:
 
 
 class CoreMachine(RuleBasedStateMachine):
-    """The core, used as the node uses it."""
+    """The core, as the node uses it: a ``Plant``, by its public methods."""
 
     sequences = 0   # counts, of the class
     done = {}
@@ -143,37 +149,44 @@ class CoreMachine(RuleBasedStateMachine):
         self.paused = False
 
     @initialize(variant=st.sampled_from(VARIANTS), rate=st.sampled_from([50.0, 200.0, 1000.0]),
-                start=st.tuples(finite, finite), kind=st.sampled_from(KINDS))
-    def begin(self, variant, rate, start, kind):
-        self.rate = rate
-        self.settings = NodeParameters(variant=variant, rate=rate)
-        self.simulation = kind(variant, 1 / rate, initial_velocity=start)
-        self.inputs = HeldInputs(self.simulation.mechanism.ports, self.settings.torque_limit,
-                                   self.settings.torque_timeout * rate)
+                start=st.tuples(finite, finite), audited=st.booleans())
+    def begin(self, variant, rate, start, audited):
+        outputs = variant_named(variant).mechanism.outputs
+        self.plant = Plant({
+            'variant': variant, 'rate': rate, 'energy_audit': audited,
+            **{f'initial_velocity.{shaft}': v for shaft, v in zip(outputs, start)}}, SILENT)
+        self.simulation, self.inputs = self.plant.simulation, self.plant.inputs
         self.laws = Laws(variant)
-        self.ticks, self.demand = 0, {}   # what they should be: {shaft: (torque, tick)}
+        self.last_stamp = self.ticks = 0
+        self.demand = {}   # what it should be: {shaft: (torque, tick)}
 
     def count(self, what):
         self.done[what] = self.done.get(what, 0) + 1
 
-    @rule(data=st.data())
-    def demands(self, data):
-        shafts = self.simulation.inputs
+    def in_force(self):
+        """Return all that a refused request must not touch."""
+        return (self.plant.values, self.inputs.limit, self.inputs.timeout,
+                self.inputs.in_force(self.ticks), repr(self.simulation.snapshot()))
+
+    @rule(data=st.data(), stamp=st.sampled_from(STAMPS))
+    def demands(self, data, stamp):
+        shafts, limit = self.simulation.inputs, self.inputs.limit
         names, torques = data.draw(DEMANDS[shafts])
-        good = as_demanded(shafts, names, torques)
-        before = (self.inputs.in_force(self.ticks), self.inputs.received, self.inputs.refused)
-        limit = self.inputs.limit
-        try:
-            clamped = self.inputs.demand(names, torques, self.ticks)
-        except ValueError:
-            assert not good
+        stamp = stamp_of(stamp, self.last_stamp)
+        good = as_demanded(shafts, names, torques) and (stamp == 0 or stamp > self.last_stamp)
+        before, counts = self.in_force(), (self.inputs.received, self.inputs.refused)
+        refused, clamped = self.plant.refusing.count, self.plant.clamping.count
+        assert self.plant.take(names, torques, 'a demand', stamp) == good
+        assert (self.inputs.received - counts[0], self.inputs.refused - counts[1]) == (
+            (1, 0) if good else (0, 1))
+        assert self.plant.refusing.count - refused == (not good)
+        if not good:
             self.count('refused demands')
-            assert before == (self.inputs.in_force(self.ticks), self.inputs.received,
-                              self.inputs.refused - 1)
+            assert repr(self.in_force()) == repr(before)
             return
-        assert good
-        assert clamped == any(abs(torque) > limit for torque in torques)
+        assert self.plant.clamping.count - clamped == any(abs(T) > limit for T in torques)
         self.count('demands')
+        self.last_stamp = stamp or self.last_stamp
         for name, torque in zip(names, torques):
             self.demand[name] = max(-limit, min(limit, torque)), self.ticks
 
@@ -187,64 +200,48 @@ class CoreMachine(RuleBasedStateMachine):
                 0.0 if shaft not in self.demand or timeout
                 and self.demand[shaft][1] < self.ticks - timeout else self.demand[shaft][0]
                 for shaft in self.simulation.inputs)
-            before = self.simulation.snapshot()
-            try:
-                self.simulation.advance(torques)
-            except ValueError:
+            before, refused = self.simulation.snapshot(), self.plant.out_of_range.count
+            snapshot = self.plant.tick()
+            if self.plant.out_of_range.count > refused:
                 self.count('refused ticks')
-                assert repr(self.simulation.snapshot()) == repr(before)
+                assert repr(snapshot) == repr(before)
                 continue
             self.ticks += 1
             self.count('ticks')
-            assert self.simulation.snapshot().torque == torques
+            assert snapshot.torque == torques
             self.laws_hold()
 
     @rule(data=st.data(), substeps=st.none() | st.sampled_from([0, 1, 2, 5, 2.5]))
     def change_of_the_mechanism(self, data, substeps):
         changed = data.draw(TABLES[type(self.simulation.parameters)])
-        before, parameters = self.simulation.snapshot(), self.simulation.parameters
+        self.change_of(changed if substeps is None else {**changed, 'substeps': substeps})
+
+    @rule(changed=own_changes | changes(NodeParameters))
+    def change_of(self, changed):
+        before, snapshot = self.in_force(), self.simulation.snapshot()
+        parameters, substeps = self.simulation.parameters, self.simulation.substeps
         try:
-            prepared = self.simulation.prepare(changed, substeps)
-        except ValueError:
+            prepared = self.plant.prepared(changed)
+        except ValueError as error:
+            assert str(error)
             self.count('refused changes')
-            assert repr(self.simulation.snapshot()) == repr(before)
+            assert repr(self.in_force()) == repr(before)
             assert self.simulation.parameters is parameters
             return
-        assert repr(self.simulation.snapshot()) == repr(before)
+        assert repr(self.in_force()) == repr(before)
+        self.plant.adopt(prepared)
         self.count('changes')
-        self.simulation.adopt(prepared)
-        assert self.simulation.parameters == parameters.changed(changed)
+        assert self.plant.values == {**before[0], **changed}
+        assert self.simulation.substeps == self.plant.settings.substeps
         after = self.simulation.snapshot()
-        self.laws.parameters_changed(before.position)
-        assert after.position == before.position
-        np.testing.assert_allclose(after.velocity[1:3], before.velocity[1:3], rtol=1e-12,
-                                   atol=1e-12 * max(map(abs, before.velocity[1:3]))
+        assert after.position == snapshot.position
+        if (self.simulation.parameters, self.simulation.substeps) != (parameters, substeps):
+            self.laws.parameters_changed(snapshot.position)
+        np.testing.assert_allclose(after.velocity[1:3], snapshot.velocity[1:3], rtol=1e-12,
+                                   atol=1e-12 * max(map(abs, snapshot.velocity[1:3]))
                                    + SUBNORMAL)
-
-    @rule(changed=own_changes)
-    def change_of_the_node(self, changed):
-        before = self.settings
-        try:
-            self.settings = self.settings.changed(changed)
-        except ValueError:
-            self.count('refused changes')
-            assert self.settings is before
-            return
-        self.count('changes')
-        self.inputs.limit = self.settings.torque_limit
-        self.inputs.timeout = self.settings.torque_timeout * self.rate
-        self.simulation.power_flow_deadband = self.settings.deadband
-        self.simulation.initial_velocity = self.settings.initial_velocity(
-            self.simulation.outputs)
-        if self.settings.substeps != self.simulation.substeps:
-            before = self.simulation.snapshot()
-            try:
-                self.simulation.substeps = self.settings.substeps
-            except ValueError:   # too fine for the numbers
-                self.settings = dataclasses.replace(self.settings,
-                                                    substeps=self.simulation.substeps)
-                return
-            self.laws.parameters_changed(before.position)
+        # a demand that was clamped to an older limit stays what it is
+        assert self.inputs.limit == self.plant.settings.torque_limit
 
     @rule()
     def pause(self):
@@ -252,11 +249,16 @@ class CoreMachine(RuleBasedStateMachine):
         self.count('pauses')
 
     @rule()
+    def look(self):
+        self.plant.notice()
+        self.plant.settle()
+
+    @rule()
     def reset(self):
-        self.simulation.reset()
-        self.inputs.forget()
+        self.plant.reset()
         self.laws.start_over()
-        self.ticks, self.demand = 0, {}
+        self.last_stamp = self.ticks = 0
+        self.demand = {}
         self.count('resets')
         snapshot = self.simulation.snapshot()
         assert (snapshot.time, snapshot.power_flow) == (0.0, 1)
@@ -264,7 +266,7 @@ class CoreMachine(RuleBasedStateMachine):
 
     @invariant()
     def laws_hold(self):
-        if not hasattr(self, 'simulation'):
+        if not hasattr(self, 'plant'):
             return
         snapshot = self.simulation.snapshot()
         assert self.simulation.ticks == self.ticks
@@ -302,14 +304,14 @@ class NodeMachine(RuleBasedStateMachine):
     def request(self, changed):
         from rcl_interfaces.srv import SetParameters
         from rclpy.parameter import Parameter
-        return self.node._parameter_services.set_parameters(
+        return self.node.requests.parameters.set_parameters(
             SetParameters.Request(parameters=[
                 Parameter(name, value=value).to_parameter_msg()
                 for name, value in changed.items()]), SetParameters.Response()).results
 
     def in_force(self):
         """Return all that a refused request must not touch."""
-        simulation, inputs = self.node.simulation, self.node._inputs
+        simulation, inputs = self.node.simulation, self.node.plant.inputs
         return (simulation.parameters, simulation.substeps, simulation.power_flow_deadband,
                 simulation.initial_velocity, inputs.limit, repr(simulation.snapshot()),
                 {name: self.node.get_parameter(name).value for name in self.defaults})
@@ -323,20 +325,18 @@ class NodeMachine(RuleBasedStateMachine):
         shafts = self.node.simulation.inputs
         names, torques = data.draw(DEMANDS[shafts])
         for _ in range(times):
-            stamp_now = {'none': 0, 'next': self.last_stamp + 1, 'same': self.last_stamp,
-                         'old': self.last_stamp // 2, 'far': self.last_stamp + 10**17,
-                         'below': -10**9}[stamp]
-            stamp_now = min(stamp_now, (2**31 - 1) * 10**9)
+            stamp_now = stamp_of(stamp, self.last_stamp)
             message = JointState(name=names, effort=torques)
             message.header.stamp = Time(sec=stamp_now // 10**9, nanosec=stamp_now % 10**9)
             good = as_demanded(shafts, names, torques) and (
                 stamp_now == 0 or stamp_now > self.last_stamp)
-            before = self.node._inputs.received, self.node._inputs.refused, self.in_force()[-2]
-            refused_ticks = self.node._diagnostics.out_of_range.count
+            inputs = self.node.plant.inputs
+            before = inputs.received, inputs.refused, self.in_force()[-2]
+            refused_ticks = self.node.plant.out_of_range.count
             with self.node.control.lock:
-                self.node._lockstep_tick(message)
-            received, refused = self.node._inputs.received, self.node._inputs.refused
-            assert (received - before[0], refused - before[1]) == ((1, 0) if good else (0, 1))
+                self.node.lockstep_tick(message)
+            assert (inputs.received - before[0], inputs.refused - before[1]) == (
+                (1, 0) if good else (0, 1))
             if not good:
                 self.count('refused messages')
                 assert not self.heard and self.in_force()[-2] == before[-1]
@@ -345,7 +345,7 @@ class NodeMachine(RuleBasedStateMachine):
             self.a_tick_was_made(refused_ticks)
 
     def a_tick_was_made(self, refused_ticks):
-        refused = self.node._diagnostics.out_of_range.count - refused_ticks
+        refused = self.node.plant.out_of_range.count - refused_ticks
         assert refused in (0, 1)
         self.ticks += not refused
         self.count('refused ticks' if refused else 'ticks')
@@ -379,15 +379,15 @@ class NodeMachine(RuleBasedStateMachine):
     @rule(wanted=st.sampled_from([False, False, True]))
     def pause(self, wanted):
         from std_srvs.srv import SetBool
-        response = self.node._pause(SetBool.Request(data=wanted), SetBool.Response())
+        response = self.node.requests.pause(SetBool.Request(data=wanted), SetBool.Response())
         assert response.success and self.node.control.running.is_set() != wanted
         self.count('pauses')
 
     @rule()
     def step(self):
         from std_srvs.srv import Trigger
-        refused_ticks = self.node._diagnostics.out_of_range.count
-        response = self.node._step(Trigger.Request(), Trigger.Response())
+        refused_ticks = self.node.plant.out_of_range.count
+        response = self.node.requests.step(Trigger.Request(), Trigger.Response())
         assert response.success != self.node.control.running.is_set()
         if response.success:
             self.a_tick_was_made(refused_ticks)
@@ -395,16 +395,16 @@ class NodeMachine(RuleBasedStateMachine):
     @rule()
     def reset(self):
         from std_srvs.srv import Trigger
-        assert self.node._reset(Trigger.Request(), Trigger.Response()).success
+        assert self.node.requests.reset(Trigger.Request(), Trigger.Response()).success
         self.count('resets')
         self.laws.start_over()
         self.last_stamp = self.ticks = 0
         assert not any((*self.node.simulation.snapshot().position,
-                        *self.node._inputs.in_force(0)))
+                        *self.node.plant.inputs.in_force(0)))
 
     @rule()
     def diagnose(self):
-        self.node._diagnose()
+        self.node.diagnose()
 
     @invariant()
     def laws_hold(self):
@@ -458,8 +458,9 @@ def nodes():
             stack.callback(node.close)
             node.get_logger().set_level(LoggingSeverity.FATAL)   # it has much to complain about
             messages = []
-            for publisher in ('_joint_states', '_internal_moments', '_power_flow'):
-                setattr(node, publisher, Heard(getattr(node, publisher), messages))
+            for publisher in ('joint_states', 'internal_moments', 'power_flow'):
+                setattr(node.outputs, publisher,
+                        Heard(getattr(node.outputs, publisher), messages))
             tables = (NodeParameters(), node.simulation.parameters)
             defaults = {name: value for table in tables for name, value in table.named().items()
                         if node.has_parameter(name)

@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the node says of itself: conditions that are logged at their ends, and /diagnostics."""
+"""What the node says of itself once in a second: /diagnostics."""
 
 import time
 
@@ -9,34 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from dm_ros.motion.energy import AuditedSimulation, rated_efficiency
-
-
-class Condition:
-    """Something that should not be: counted, logged when it begins and when it has ended."""
-
-    def __init__(self, what, logger):
-        """:param what: in words, such as ``ticks are missed``; logger: of the node."""
-        self.what = what
-        self.count = 0
-        self.reason = ''
-        self.active = False
-        self._logger = logger
-        self._settled = 0
-
-    def happened(self, reason, times=1):
-        """Count it, and log it if it begins now."""
-        self.count += times
-        self.reason = reason
-        if not self.active:
-            self.active = True
-            self._logger.warning(f'{self.what}: {reason}')
-
-    def settle(self):
-        """Log its end if it did not happen since the last call; to be called at 1 Hz."""
-        if self.active and self.count == self._settled:
-            self.active = False
-            self._logger.info(f'over: {self.what} ({self.count} in all)')
-        self._settled = self.count
+from dm_ros.plant import Condition
 
 
 def status(name, complaints, fine, values):
@@ -63,96 +36,83 @@ def lateness_values(lateness):
 
 
 class Diagnostics:
-    """The state of the node as /diagnostics tells it, and the conditions it logs."""
+    """The state of a node as /diagnostics tells it."""
 
-    def __init__(self, name, logger, simulation, pacer, inputs, control, neighbours):
-        """Take what is looked at; ``name``: of the node."""
-        self.name, self.neighbours = name, neighbours
-        self.simulation, self.pacer, self.inputs, self.control = simulation, pacer, inputs, control
-        self.ticks = 0   # since the node is there
-        self.missing = Condition('ticks are missed', logger)
-        self.coarse = Condition('solver steps are coarse', logger)
-        self.out_of_range = Condition('ticks are refused', logger)
-        self.refusing = Condition('torque messages are refused', logger)
-        self.clamping = Condition('torques are clamped', logger)
-        self.stale = Condition('torques are too old and count as zero', logger)
-        self.misfitting = Condition('QoS does not fit', logger)
-        self.ambiguous = Condition('another node has the same name', logger)
+    def __init__(self, node):
+        self._node, log = node, node.get_logger()
+        self.missing = Condition('ticks are missed', log)
+        self.misfitting = Condition('QoS does not fit', log)
+        self.ambiguous = Condition('another node has the same name', log)
         self._before = 0, time.monotonic_ns()
-        self._coarse_before = 0
 
     def report(self, stamp):
         """Return the DiagnosticArray of the time since the last report; to be called at 1 Hz."""
-        self._notice()
+        plant = self._node.plant
+        missed = self._node.pacer.missed - self.missing.count
+        if missed > 0:
+            self.missing.happened(f'{missed} since the last report', missed)
+        plant.notice()
         statuses = [self._loop(), self._torques(), self._connections()]
-        if isinstance(self.simulation, AuditedSimulation):
+        if isinstance(plant.simulation, AuditedSimulation):
             statuses.append(self._energy())
-        for condition in (self.missing, self.coarse, self.out_of_range, self.refusing,
-                          self.clamping, self.stale, self.misfitting, self.ambiguous):
+        plant.settle()
+        for condition in (self.missing, self.misfitting, self.ambiguous):
             condition.settle()
         return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
 
-    def _notice(self):
-        """Count what is not counted where it happens."""
-        missed = self.pacer.missed - self.missing.count
-        if missed > 0:
-            self.missing.happened(f'{missed} since the last report', missed)
-        coarse = self.simulation.coarse_steps
-        if coarse > self._coarse_before:
-            self.coarse.happened('their work reached its bound', coarse - self._coarse_before)
-        self._coarse_before = coarse
-        stale = self.inputs.stale(self.simulation.ticks)
-        if stale:
-            self.stale.happened(', '.join(stale))
+    def _status(self, part, complaints, fine, values):
+        return status(f'{self._node.get_name()}: {part}', complaints, fine, values)
 
     def _loop(self):
-        ticks, now = self.ticks, time.monotonic_ns()
+        plant, pacer = self._node.plant, self._node.pacer
+        ticks, now = plant.ticks, time.monotonic_ns()
         (ticks_before, before), self._before = self._before, (ticks, now)
-        running = 'running' if self.control.running.is_set() else 'paused'
-        return status(
-            f'{self.name}: loop', active(self.missing, self.coarse, self.out_of_range), running, {
-                'variant': self.simulation.variant,
-                'rate wanted [Hz]': f'{1.0 / self.simulation.dt:g}',
+        running = 'running' if self._node.control.running.is_set() else 'paused'
+        return self._status(
+            'loop', active(self.missing, plant.coarse, plant.out_of_range), running, {
+                'variant': plant.simulation.variant,
+                'rate wanted [Hz]': f'{1.0 / plant.simulation.dt:g}',
                 'rate held [Hz]': f'{(ticks - ticks_before) / (now - before) * 1e9:.2f}',
-                **lateness_values(self.pacer.take_lateness()),
+                **lateness_values(pacer.take_lateness()),
                 'ticks': ticks,
-                'missed ticks': self.pacer.missed,
-                'refused ticks': self.out_of_range.count,
-                'coarse solver steps': self.coarse.count,
-                'simulated time [s]': f'{self.simulation.time:.9g}'})
+                'missed ticks': pacer.missed,
+                'refused ticks': plant.out_of_range.count,
+                'coarse solver steps': plant.coarse.count,
+                'simulated time [s]': f'{plant.simulation.time:.9g}'})
 
     def _torques(self):
-        inputs = self.inputs
-        silent, stale = inputs.silent(), inputs.stale(self.simulation.ticks)
-        return status(
-            f'{self.name}: torques', active(self.refusing, self.clamping, self.stale),
+        plant = self._node.plant
+        inputs = plant.inputs
+        silent, stale = inputs.silent(), inputs.stale(plant.simulation.ticks)
+        return self._status(
+            'torques', active(plant.refusing, plant.clamping, plant.stale),
             'no torque yet' if len(silent) == len(inputs.ports) else 'fine', {
                 'received messages': inputs.received,
                 'refused messages': inputs.refused,
-                'last refused': self.refusing.reason or 'none',
+                'last refused': plant.refusing.reason or 'none',
                 'clamped messages': inputs.clamped,
                 'stale': ', '.join(stale) or 'none',
                 'without any torque yet': ', '.join(silent) or 'none'})
 
     def _connections(self):
-        misfits = '; '.join(f'{t}: {what}' for t, what in self.neighbours.misfits().items())
-        namesakes = self.neighbours.namesakes()
+        misfits = '; '.join(f'{t}: {what}' for t, what in self._node.neighbours.misfits().items())
+        namesakes = self._node.neighbours.namesakes()
         if misfits:
             self.misfitting.happened(misfits)
         if namesakes:
             self.ambiguous.happened(f'{namesakes} more')
-        return status(
-            f'{self.name}: connections', active(self.misfitting, self.ambiguous), 'fine', {
+        return self._status(
+            'connections', active(self.misfitting, self.ambiguous), 'fine', {
                 'QoS that does not fit': misfits or 'none',
                 'other nodes of the same name': namesakes})
 
     def _energy(self):
-        simulation = self.simulation
-        with self.control.lock:   # one and the same tick
+        simulation = self._node.simulation
+        with self._node.control.lock:   # one and the same tick
             total, worst, simulation.worst = simulation.total, simulation.worst, 0.0
             stored, efficiency = simulation.stored_energy, simulation.tick.efficiency
             returned = dict(simulation.returned)
-        return status(f'{self.name}: energy', [], 'fine', {
+        return self._status('energy', [], 'fine', {
             'worst balance residual since the last report [relative]': f'{worst:.1e}',
             'work of the torques [J]': f'{sum(total.work):.6g}',
             'stored [J]': f'{stored:.6g}',

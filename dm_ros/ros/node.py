@@ -11,7 +11,6 @@ import threading
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import SetParametersResult
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
@@ -19,17 +18,10 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Int8
-from std_srvs.srv import SetBool, Trigger
 
 from dm_ros.ending import run_command
-from dm_ros.mechanism.variants import variant_named
-from dm_ros.motion.energy import AuditedSimulation
-from dm_ros.motion.held_inputs import HeldInputs
 from dm_ros.motion.pacing import Pacer
-from dm_ros.motion.simulation import Simulation
+from dm_ros.plant import Plant
 from dm_ros.ros.diagnostics import Diagnostics
 from dm_ros.ros.graph import Neighbours
 from dm_ros.ros.leftovers import remove_leftovers
@@ -40,19 +32,10 @@ from dm_ros.ros.loops import (
     follow_ros_clock,
     follow_steady_clock,
 )
-from dm_ros.ros.messages import (
-    LATEST_QOS,
-    LOCKSTEP_INPUT_QOS,
-    LOCKSTEP_OUTPUT_QOS,
-    never_called,
-    OUTPUT_QOS,
-    Polled,
-    SHARED_QOS,
-    SnapshotMessages,
-)
-from dm_ros.ros.parameters import declare, strictly_checked
-from dm_ros.ros.privates import given_parameters, poll, WholeRequests
-from dm_ros.settings import known_rows, NodeParameters
+from dm_ros.ros.messages import OUTPUT_QOS
+from dm_ros.ros.parameters import declare_all
+from dm_ros.ros.services import Requests
+from dm_ros.ros.topics import Inputs, Outputs
 
 SWITCH_INTERVAL = 1e-4   # s that the loop waits at most for a service to let go of the interpreter
 
@@ -79,8 +62,9 @@ class DifferentialNode(Node):
     """
     A differential in real time or in lockstep.
 
-    A thread of its own waits for what advances time, steps and publishes. Parameters, services
-    and diagnostics are served by an executor and meet the loop at a lock, between two ticks.
+    A thread of its own waits for what advances time, lets the ``plant`` tick and publishes.
+    Parameters, services and diagnostics are served by an executor and meet the loop at the lock
+    of ``control``, between two ticks.
 
     :raises ValueError: for an unknown or impossible parameter; names it.
     """
@@ -88,75 +72,71 @@ class DifferentialNode(Node):
     def __init__(self, **node_options):
         super().__init__('differential', start_parameter_services=False, **node_options)
         try:
-            self._declare_parameters()
+            self.plant = Plant(declare_all(self), self.get_logger())
+            self._follows_clock = self.get_parameter('use_sim_time').value
+            if self._follows_clock and self.plant.settings.publish_clock:
+                raise ValueError('publish_clock: a node that follows /clock, by use_sim_time, '
+                                 'cannot drive it')
         except ValueError:
             self.destroy_node()
             raise
         self.control = Control()
         self.on_tick = None   # called with each snapshot that a tick publishes
+        settings = self.plant.settings
+        # another simulator's clock may leap by many ticks, but not by more than a second
+        self.pacer = Pacer(1e9 / settings.rate,
+                           patience=settings.rate if self._follows_clock else 0)
+        self.set_pace()
         self._failure = None
         self._thread = threading.Thread(target=self._run, name='differential loop')
 
-        simulation, lockstep = self.simulation, self._settings.mode == 'lockstep'
-        output_qos = LOCKSTEP_OUTPUT_QOS if lockstep else OUTPUT_QOS
-        self._messages = SnapshotMessages(
-            simulation.shafts, simulation.inputs, simulation.moments)
-        self._neighbours = Neighbours(self)
-        self._joint_states = self._publisher(JointState, '~/joint_states', output_qos)
-        self._internal_moments = self._publisher(
-            JointState, '~/internal_moments', output_qos)
-        self._power_flow = self._publisher(Int8, '~/power_flow', output_qos)
-        self._report = self._publisher(DiagnosticArray, '/diagnostics', OUTPUT_QOS)
-        self._clock_publisher = (self._publisher(ClockMessage, '/clock', output_qos)
-                                 if self._settings.publish_clock else None)
-        self._simulated_stamps = lockstep or self._settings.publish_clock
-
-        polled = Polled()
-        self._shaft_torques = [] if lockstep else [
-            (shaft, self.create_subscription(Float64, f'~/torque/{shaft}', never_called,
-                                             LATEST_QOS, callback_group=polled))
-            for shaft in simulation.inputs]
-        self._torques = self.create_subscription(
-            JointState, '~/torques', never_called,
-            LOCKSTEP_INPUT_QOS if lockstep else SHARED_QOS, callback_group=polled)
-        if lockstep:   # in real time publishers of all kinds are heard
-            self._neighbours.watch('~/torques', 'RELIABILITY')
-
-        self.create_service(Trigger, '~/reset', self._reset)
-        self.create_service(SetBool, '~/pause', self._pause)
-        self.create_service(Trigger, '~/step', self._step)
-        self._parameter_services = WholeRequests(self, strictly_checked)
+        self.neighbours = Neighbours(self)
+        self.outputs = Outputs(self)
+        self.inputs = Inputs(self)
+        self._report = self.publisher(DiagnosticArray, '/diagnostics', OUTPUT_QOS)
+        self.requests = Requests(self)
+        self._diagnostics = Diagnostics(self)
         # the steady clock: a timer of the ROS clock stalls when system time steps back
-        self.create_timer(1.0, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        log = self.get_logger()
-        self._diagnostics = Diagnostics(
-            self.get_name(), log, simulation, self._pacer, self._inputs, self.control,
-            self._neighbours)
-        log.info(f'{simulation.variant} at {self._settings.rate:g} Hz, {self._settings.mode}, '
-                 f'torques on {", ".join(simulation.inputs)}')
+        self.create_timer(1.0, self.diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.get_logger().info(
+            f'{settings.variant} at {settings.rate:g} Hz, {settings.mode}, '
+            f'torques on {", ".join(self.simulation.inputs)}')
+
+    @property
+    def simulation(self):
+        """The simulation of the ``plant``."""
+        return self.plant.simulation
 
     def start(self):
         """Begin to tick."""
         self._thread.start()
 
-    def reset(self):
-        """Go back to the start; the lock of ``control`` must be held."""
-        self.simulation.reset()
-        self._inputs.forget()
-        self._last_stamp = 0
-
     def publish_state(self):
         """Publish the state as it is; the lock of ``control`` must be held."""
-        self._publish(self.simulation.snapshot())
-
-    def discard_torques(self):
-        """Take all waiting messages on ``~/torques`` without a tick; return their number."""
-        return sum(1 for _ in poll(self._torques))
+        self.outputs.publish(self.simulation.snapshot())
 
     def is_connected(self):
         """Return whether somebody gives torques and somebody hears the joint states."""
-        return (self._torques.get_publisher_count() > 0
-                and self._joint_states.get_subscription_count() > 0)
+        return (self.inputs.torques.get_publisher_count() > 0
+                and self.outputs.joint_states.get_subscription_count() > 0)
+
+    def set_pace(self):
+        """Let the pacer follow the settings; the lock of ``control`` must be held."""
+        settings, pacer = self.plant.settings, self.pacer
+        factor = 1.0 if self._follows_clock else settings.real_time_factor
+        period = 1e9 / (settings.rate * factor)
+        if period != pacer.period:
+            pacer.period = period
+            pacer.restart(time.monotonic_ns())
+
+    def diagnose(self):
+        """Publish on ``/diagnostics``; to be called at 1 Hz."""
+        self._report.publish(self._diagnostics.report(self.get_clock().now().to_msg()))
+
+    def publisher(self, message_type, topic, qos):
+        """Return a publisher that tells of subscribers whose QoS does not fit."""
+        return self.create_publisher(message_type, topic, qos,
+                                     event_callbacks=self.neighbours.of_publisher(topic))
 
     def close(self):
         """Stop ticking and destroy the node; raise what had stopped the loop, if anything."""
@@ -167,205 +147,47 @@ class DifferentialNode(Node):
         if self._failure:
             raise self._failure
 
-    def _publisher(self, message_type, topic, qos):
-        return self.create_publisher(message_type, topic, qos,
-                                     event_callbacks=self._neighbours.of_publisher(topic))
-
-    # parameters
-
-    def _declare_parameters(self):
-        known = known_rows()
-        for name in given_parameters(self):
-            if name not in known and not self.has_parameter(name):
-                raise ValueError(f'{name}: there is no such parameter')
-        settings = NodeParameters()
-        variant = given_parameters(self).get('variant', settings.variant)
-        mechanism = variant_named(settings.changed({'variant': variant}).variant).mechanism
-        not_mine = [f'initial_velocity.{shaft}' for shaft in ('left', 'right', 'front', 'rear')
-                    if shaft not in mechanism.outputs]
-        settings = declare(self, settings, lambda name: name not in not_mine)
-        parameters = declare(self, mechanism.parameters())
-        kind = AuditedSimulation if settings.energy_audit else Simulation
-        self.simulation = kind(
-            variant, dt=1.0 / settings.rate, parameters=parameters, substeps=settings.substeps,
-            power_flow_deadband=settings.deadband,
-            initial_velocity=settings.initial_velocity(mechanism.outputs))
-        self._settings = settings
-        self._follows_clock = self.get_parameter('use_sim_time').value
-        if self._follows_clock and settings.publish_clock:
-            raise ValueError('publish_clock: a node that follows /clock, by use_sim_time, '
-                             'cannot drive it')
-        # another simulator's clock may leap by many ticks, but not by more than a second
-        self._pacer = Pacer(1e9 / settings.rate,
-                            patience=settings.rate if self._follows_clock else 0)
-        self._inputs = HeldInputs(self.simulation.mechanism.ports, settings.torque_limit, 0.0)
-        self._last_stamp = 0
-        self._prepared = settings, None
-        self._apply(settings)
-        self.add_on_set_parameters_callback(self._check_parameters)
-        self.add_post_set_parameters_callback(self._take_parameters)
-
-    def _check_parameters(self, parameters):
-        """Refuse a request as a whole, or prepare all that it changes."""
-        changes = {parameter.name: parameter.value for parameter in parameters}
-        own, mechanism = split(changes, self._settings, self.simulation.parameters)
-        try:
-            settings = self._settings.changed(own)
-            prepared = None
-            if mechanism or settings.substeps != self._settings.substeps:
-                prepared = self.simulation.prepare(mechanism, settings.substeps)
-        except ValueError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        self._prepared = settings, prepared
-        return SetParametersResult(successful=True)
-
-    def _take_parameters(self, parameters):
-        """Put what was prepared into force between two ticks."""
-        settings, prepared = self._prepared
-        with self.control.lock:
-            if prepared:
-                self.simulation.adopt(prepared)
-            self._apply(settings)
-
-    def _apply(self, settings):
-        """Put the parameters of the node that may change while it runs into force."""
-        self._settings = settings
-        simulation, inputs, pacer = self.simulation, self._inputs, self._pacer
-        simulation.power_flow_deadband = settings.deadband
-        simulation.initial_velocity = settings.initial_velocity(simulation.outputs)
-        inputs.limit = settings.torque_limit
-        # in lockstep time stands still without torques, so none is too old
-        inputs.timeout = 0.0 if settings.mode == 'lockstep' else (
-            settings.torque_timeout * settings.rate)
-        factor = 1.0 if self._follows_clock else settings.real_time_factor
-        period = 1e9 / (settings.rate * factor)
-        if period != pacer.period:
-            pacer.period = period
-            pacer.restart(time.monotonic_ns())
-
-    # services
-
-    def _reset(self, request, response):
-        with self.control.lock:
-            self.reset()
-            self.publish_state()
-        response.success = True
-        return response
-
-    def _pause(self, request, response):
-        with self.control.lock:
-            if request.data:
-                self.control.running.clear()
-            else:
-                self.control.running.set()
-        response.success = True
-        response.message = 'paused' if request.data else 'running'
-        return response
-
-    def _step(self, request, response):
-        with self.control.lock:
-            response.success = not self.control.running.is_set()
-            if response.success:
-                self._take_torques()
-                self._tick()
-                response.message = f'time {self.simulation.time:.9g} s'
-            else:
-                response.message = 'only while paused, see ~/pause'
-        return response
-
     # the loop; the lock is held in a tick
 
     def _run(self):
-        control, settings = self.control, self._settings
+        control, settings = self.control, self.plant.settings
         try:
             if settings.realtime_priority:
                 ask_for_priority(settings.realtime_priority, self.get_logger())
-            if settings.mode == 'lockstep':
-                follow_messages(control, self._torques, self.context, self._lockstep_tick)
+            if self.plant.lockstep:
+                follow_messages(control, self.inputs.torques, self.context, self.lockstep_tick)
             elif self._follows_clock:
-                follow_ros_clock(control, self._pacer, self.get_clock(), self._followed_tick)
+                follow_ros_clock(control, self.pacer, self.get_clock(), self._followed_tick)
             else:
-                follow_steady_clock(control, self._pacer, self._realtime_tick)
+                follow_steady_clock(control, self.pacer, self.tick)
         except Exception as error:
             if self.context.ok():   # otherwise it is the shutdown that broke a call
                 self._failure = error
                 self.context.try_shutdown()
 
-    def _realtime_tick(self):
-        self._take_torques()
-        self._tick()
+    def tick(self):
+        """Take what came and tick; in lockstep, where each message has its tick, just tick."""
+        if not self.plant.lockstep:
+            self.inputs.take()
+        self._advance()
+
+    def lockstep_tick(self, message):
+        """Advance one tick with a message and answer it, or refuse both."""
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        if self.plant.take(message.name, message.effort, '~/torques', stamp):
+            self._advance()
 
     def _followed_tick(self):
         """Tick with the deadline as the stamp: a leap of the clock brings several at one time."""
-        self._take_torques()
-        self._tick(divmod(self._pacer.begun, 10**9))
+        self.inputs.take()
+        self._advance(divmod(self.pacer.begun, 10**9))
 
-    def _lockstep_tick(self, message):
-        """Advance one tick with a message and answer it, or refuse both."""
-        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        if stamp and stamp <= self._last_stamp:
-            self._inputs.refused += 1
-            self._diagnostics.refusing.happened(
-                '~/torques: its stamp repeats or goes back in time')
-        elif self._demand(message.name, message.effort, 'torques'):
-            self._last_stamp = stamp or self._last_stamp
-            self._tick()
-
-    def _take_torques(self):
-        """Take the torques that came since the last tick."""
-        if self._settings.mode == 'lockstep':
-            return   # each of its messages brings its own tick
-        for shaft, subscription in self._shaft_torques:
-            for message, _ in poll(subscription):
-                self._demand((shaft,), (message.data,), f'torque/{shaft}')
-        for message, _ in poll(self._torques):
-            self._demand(message.name, message.effort, 'torques')
-
-    def _tick(self, stamp=None):
-        """Advance one tick and publish; stamp: seconds and nanoseconds, None for those of now."""
-        try:
-            self.simulation.advance(self._inputs.in_force(self.simulation.ticks))
-        except ValueError as error:
-            self._diagnostics.out_of_range.happened(str(error))
-        snapshot = self.simulation.snapshot()
-        self._diagnostics.ticks += 1
-        self._publish(snapshot, stamp)
+    def _advance(self, stamp=None):
+        """Advance one tick and publish; stamp: as for ``Outputs.publish``."""
+        snapshot = self.plant.tick()
+        self.outputs.publish(snapshot, stamp)
         if self.on_tick:
             self.on_tick(snapshot)
-
-    def _demand(self, names, torques, topic):
-        """Take the torques of a message; return whether they were taken."""
-        try:
-            if self._inputs.demand(names, torques, self.simulation.ticks):
-                self._diagnostics.clamping.happened(
-                    f'~/{topic}: beyond {self._inputs.limit:g} N m')
-        except ValueError as error:
-            self._diagnostics.refusing.happened(f'~/{topic}: {error}')
-            return False
-        return True
-
-    def _publish(self, snapshot, stamp=None):
-        if self._simulated_stamps:
-            stamp = divmod(round(self.simulation.ticks * 1e9 / self._settings.rate), 10**9)
-        elif stamp is None:
-            stamp = self.get_clock().now().seconds_nanoseconds()
-        messages = self._messages
-        messages.fill(snapshot, *stamp)
-        if self._clock_publisher:
-            self._clock_publisher.publish(
-                ClockMessage(clock=messages.joint_states.header.stamp))
-        self._joint_states.publish(messages.joint_states)
-        self._internal_moments.publish(messages.internal_moments)
-        self._power_flow.publish(messages.power_flow)
-
-    def _diagnose(self):
-        self._report.publish(self._diagnostics.report(self.get_clock().now().to_msg()))
-
-
-def split(changes, *tables):
-    """Return one dict for each table of parameters, with those changes that are its own."""
-    return [{name: value for name, value in changes.items() if name in table.named()}
-            for table in tables]
 
 
 def parser():

@@ -5,8 +5,9 @@
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
+from dm_ros.mechanism.variants import variant_named
 from dm_ros.ros.privates import given_parameters
-from dm_ros.settings import known_rows
+from dm_ros.settings import known_rows, NodeParameters
 
 
 def descriptor(entry):
@@ -24,20 +25,32 @@ def descriptor(entry):
     return result
 
 
-def declare(node, parameters, wanted=lambda name: True):
+def declare_all(node):
     """
-    Declare the wanted rows of a table and return the table with the values given at the start.
+    Declare all parameters of the node; return ``{full name: value}`` with those of the start.
 
     :raises ValueError: names the parameter, its value and what is allowed.
     """
     given = given_parameters(node)
-    rows = {name: entry for name, entry in parameters.rows().values() if wanted(name)}
-    started = parameters.changed({
-        name: entry.strictly_checked(name, given[name])
-        for name, entry in rows.items() if name in given})
-    values = started.named()
+    for name in given:
+        if name not in known_rows() and not node.has_parameter(name):
+            raise ValueError(f'{name}: there is no such parameter')
+    settings = NodeParameters().changed(
+        {name: value for name, value in given.items() if name == 'variant'})
+    mechanism = variant_named(settings.variant).mechanism
+    not_mine = [f'initial_velocity.{shaft}' for shaft in ('left', 'right', 'front', 'rear')
+                if shaft not in mechanism.outputs]
+    return {**declare(node, settings, given, not_mine),
+            **declare(node, mechanism.parameters(), given)}
+
+
+def declare(node, table, given, not_mine=()):
+    """Declare the rows of a table but those that are not the node's; return as ``declare_all``."""
+    rows = {name: entry for name, entry in table.rows().values() if name not in not_mine}
+    started = table.changed({name: entry.strictly_checked(name, given[name])
+                             for name, entry in rows.items() if name in given}).named()
     for name, entry in rows.items():
-        node.declare_parameter(name, values[name], descriptor(entry))
+        node.declare_parameter(name, started[name], descriptor(entry))
     return started
 
 

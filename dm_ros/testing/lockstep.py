@@ -93,9 +93,9 @@ class LockstepDifferential:
         end = time.monotonic() + LAST_ANSWER
         while self._unanswered and time.monotonic() < end:
             self.executor.spin_once(timeout_sec=0.01)
-            self._unanswered -= self.node.discard_torques()
+            self._unanswered -= self.node.inputs.discard()
         with self.node.control.lock:
-            self.node.reset()
+            self.node.plant.reset()
         self._unanswered = 0
 
     def run(self, seconds=None, until=None):

@@ -25,7 +25,7 @@ class Simulator:
         def done():
             self.publisher.publish(message)
             # the loop has seen it: its next tick is due within a period from then
-            seen = 0 < node._pacer.due - nanoseconds <= node._pacer.period
+            seen = 0 < node.pacer.due - nanoseconds <= node.pacer.period
             return seen and node.simulation.ticks == ticks
         self.ros.until(done)
 
@@ -68,7 +68,7 @@ def test_a_clock_that_jumps_an_hour_ahead_is_not_caught_up_with(follower):
     node, simulator = follower
     simulator.show(10**9, node, 0)
     simulator.show(3601 * 10**9 + 5_000_000, node, 1)
-    assert node._pacer.missed == 359_999
+    assert node.pacer.missed == 359_999
     simulator.show(3601 * 10**9 + 20_000_000, node, 3)
 
 
@@ -109,4 +109,4 @@ def test_the_real_time_factor_is_the_speed_of_simulated_time(ros, steady, factor
     ros.until(steady.stands)
     assert node.simulation.ticks == 200 * factor
     assert node.simulation.time == pytest.approx(2.0 * factor)
-    assert node._pacer.missed == 0
+    assert node.pacer.missed == 0

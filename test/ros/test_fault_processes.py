@@ -189,11 +189,11 @@ def test_a_publisher_at_10_khz_takes_no_tick(ros, steady):
             flood.publish(Float64(data=float(sent)))
         ticks += 1
         steady.tick(node)
-        assert node.simulation.ticks == ticks >= node._inputs.received
+        assert node.simulation.ticks == ticks >= node.plant.inputs.received
         return ticks >= 20 and node.simulation.snapshot().torque[1] == sent
 
     ros.until(flooded)
-    assert node._pacer.missed == 0
+    assert node.pacer.missed == 0
 
 
 # Rights and places

@@ -101,7 +101,7 @@ def test_huge_torques_are_clamped_and_all_that_is_published_stays_finite(ros, mo
     assert any(max(map(abs, message.effort)) == 1e9 for message in joints)
     assert all(math.isfinite(number) for message in joints
                for number in (*message.position, *message.velocity, *message.effort))
-    assert node._inputs.clamped > 0
+    assert node.plant.inputs.clamped > 0
 
 
 def test_names_may_come_in_any_order(ros):
@@ -121,7 +121,7 @@ def test_in_real_time_a_torque_counts_from_when_it_came_whatever_its_stamp(ros):
             (0, now, now, now - 3600 * 10**9, now + 3600 * 10**9, -10**9), start=1):
         publisher.publish(torques(['left'], [effort], stamp))
         ros.until(lambda effort=effort: node.simulation.snapshot().torque[1] == effort)
-    assert node._inputs.refused == 0
+    assert node.plant.inputs.refused == 0
 
 
 def test_in_lockstep_a_stamp_from_before_1970_is_an_old_one(ros):
@@ -143,7 +143,7 @@ def test_in_lockstep_a_stamp_of_the_far_future_holds_until_a_reset(ros):
     publisher = ros.publisher(JointState, TORQUES)
     publisher.publish(torques(['carrier'], [1], 2 * 10**18))
     publisher.publish(torques(['carrier'], [2], 10**9))
-    ros.until(lambda: node._inputs.refused == 1 and joints)
+    ros.until(lambda: node.plant.inputs.refused == 1 and joints)
     assert [message.effort[0] for message in joints] == [1.0]
     ros.call(Trigger, '/differential/reset')
     publisher.publish(torques(['carrier'], [3], 10**9))
@@ -205,13 +205,13 @@ def test_a_stopped_and_a_slow_subscriber_hold_no_tick_up(ros, steady, listeners,
     ticks = node.simulation.ticks + 1000
     steady.passes(1000 / 500)
     ros.until(lambda: node.simulation.ticks == ticks)
-    assert node._pacer.missed == 0
+    assert node.pacer.missed == 0
 
 
 def test_in_lockstep_a_stopped_subscriber_holds_no_tick_up_even_when_its_queue_is_full(
         ros, listeners, monkeypatch):
     assert LOCKSTEP_OUTPUT_QOS.depth == 10_000   # in full in test/long
-    monkeypatch.setattr('dm_ros.ros.node.LOCKSTEP_OUTPUT_QOS', QoSProfile(depth=500))
+    monkeypatch.setattr('dm_ros.ros.topics.LOCKSTEP_OUTPUT_QOS', QoSProfile(depth=500))
     fill_the_queue_of_a_stopped_subscriber(ros, listeners, 500)
 
 

@@ -1,0 +1,256 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What advances, without ROS: demands, ticks, resets, parameters and conditions of a ``Plant``."""
+
+import pytest
+
+from dm_ros import Simulation, VARIANTS
+from dm_ros.motion.models import LOSS_LAWS
+from dm_ros.plant import Condition, Plant
+
+NAMES = {'symmetric': ('pinion', 'left', 'right'), 'lsd': ('carrier', 'front', 'rear')}
+
+
+class Log:
+    """Keeps what is logged."""
+
+    def __init__(self):
+        self.lines = []
+
+    def warning(self, line):
+        self.lines.append(f'WARN {line}')
+
+    def info(self, line):
+        self.lines.append(f'INFO {line}')
+
+
+@pytest.fixture
+def log():
+    return Log()
+
+
+@pytest.fixture
+def lockstep(log):
+    return Plant({'variant': 'lsd_ode', 'mode': 'lockstep'}, log)
+
+
+def load(n):
+    """Return torques that lock, slip and reverse."""
+    return 300.0 - n % 400, -100.0 + n % 37, -150.0 + n % 91
+
+
+def in_force(plant):
+    """Return all that a refused request must not touch."""
+    simulation, inputs = plant.simulation, plant.inputs
+    return (plant.settings, simulation.parameters, simulation.substeps, simulation.state,
+            simulation.ticks, simulation.power_flow_deadband, simulation.initial_velocity,
+            inputs.in_force(simulation.ticks), inputs.limit, inputs.timeout, inputs.received)
+
+
+# Ticks
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+@pytest.mark.parametrize('audited', [True, False])
+@pytest.mark.parametrize('loss_law', LOSS_LAWS)
+def test_it_moves_as_the_simulation_bit_for_bit(variant, audited, loss_law, log):
+    mechanism = variant.split('_')[0]
+    outputs = NAMES[mechanism][1:]
+    plant = Plant({
+        'variant': variant, 'rate': 500.0, 'energy_audit': audited, 'loss_law': loss_law,
+        'substeps': 2, 'power_flow_deadband': 3.0, f'{mechanism}.satellite_ratio': 0.9,
+        f'initial_velocity.{outputs[0]}': 5.0, f'initial_velocity.{outputs[1]}': 4.0}, log)
+    simulation = Simulation(variant, 1 / 500.0, {f'{mechanism}.satellite_ratio': 0.9},
+                            loss_law=loss_law, substeps=2, power_flow_deadband=3.0,
+                            initial_velocity=(5.0, 4.0))
+    for n in range(300):
+        assert plant.take(NAMES[mechanism], load(n), 'test')
+        assert tuple(plant.tick()) == tuple(simulation.step(load(n)))
+    assert plant.ticks == plant.simulation.ticks == 300
+    assert not log.lines
+
+
+def test_the_losses_follow_the_law_that_is_asked_for(log):
+    torques = (10.0, 15.0, -40.0)   # the wheel that drives gets more than it gives under paper
+    ends = {}
+    for loss_law in LOSS_LAWS:
+        plant = Plant({'loss_law': loss_law}, log)
+        plant.take(('pinion', 'left', 'right'), torques, 'test')
+        for _ in range(50):
+            ends[loss_law] = plant.tick()
+    assert ends['passive'].velocity != ends['paper'].velocity
+
+
+def test_an_unknown_law_is_refused_and_named(log):
+    with pytest.raises(ValueError, match="loss_law: 'torsen' is not allowed.*passive, paper"):
+        Plant({'loss_law': 'torsen'}, log)
+
+
+def test_a_tick_out_of_range_is_refused_and_counted_and_the_state_stays(log):
+    shafts = Simulation('symmetric_ode').shafts
+    plant = Plant({'torque_limit': 1e9, 'loss_law': 'paper',
+                   **{f'symmetric.inertia.{shaft}': 1e-302 for shaft in shafts},
+                   **{f'symmetric.viscosity.{shaft}': 0.0 for shaft in shafts}}, log)
+    before = plant.tick()
+    assert plant.take(('pinion',), (1e9,), 'test')
+    assert plant.tick() == before
+    assert (plant.ticks, plant.simulation.ticks, plant.out_of_range.count) == (2, 1, 1)
+
+
+# Demands
+
+
+def test_in_their_order_stamps_go_up_and_a_zero_stamp_is_none(lockstep, log):
+    taken = [lockstep.take(('carrier',), (float(effort),), 'test', stamp)
+             for effort, stamp in enumerate((0, 100, 100, 50, -1, 0, 101))]
+    assert taken == [True, True, False, False, False, True, True]
+    assert lockstep.inputs.in_force(0) == (6.0, 0.0, 0.0)
+    assert (lockstep.inputs.received, lockstep.inputs.refused) == (4, 3)
+    assert log.lines == [
+        'WARN torque messages are refused: test: its stamp repeats or goes back in time']
+    lockstep.reset()
+    assert lockstep.take(('carrier',), (1.0,), 'test', 1)
+
+
+def test_a_stamp_of_a_refused_demand_does_not_count(lockstep):
+    assert not lockstep.take(('wheel',), (1.0,), 'test', 100)
+    assert lockstep.take(('carrier',), (1.0,), 'test', 50)
+
+
+@pytest.mark.parametrize('names, values, why', [
+    (('front', 'wheel'), (1.0, 1.0), "'wheel' is not one of carrier, front, rear"),
+    (('front', 'front'), (1.0, 1.0), 'a shaft is named twice in front, front'),
+    (('front', 'rear'), (1.0,), '2 names but 1 values'),
+    (('front', 'rear'), (1.0, float('nan')), 'the torque on rear is nan')])
+def test_a_refused_demand_leaves_everything_as_it_was(lockstep, names, values, why):
+    lockstep.take(('carrier', 'front'), (3.0, 2.0), 'test')
+    lockstep.tick()
+    before = in_force(lockstep)
+    assert not lockstep.take(names, values, 'a test')
+    assert in_force(lockstep) == before
+    assert lockstep.inputs.refused == lockstep.refusing.count == 1
+    assert lockstep.refusing.reason == f'a test: {why}'
+
+
+def test_a_demand_beyond_the_limit_is_clamped_and_counted(log):
+    plant = Plant({'torque_limit': 20.0}, log)
+    assert plant.take(('left', 'right'), (-1e308, 5.0), 'test')
+    assert plant.tick().torque == (0.0, -20.0, 5.0)
+    assert log.lines == ['WARN torques are clamped: test: beyond 20 N m']
+
+
+def test_a_demand_grows_stale_in_real_time_and_never_in_lockstep(log):
+    for mode, torque in (('realtime', 0.0), ('lockstep', 7.0)):
+        plant = Plant({'mode': mode, 'rate': 100.0, 'torque_timeout': 0.1}, log)
+        plant.take(('left',), (7.0,), 'test')
+        for _ in range(11):
+            assert plant.tick().torque[1] == 7.0
+        assert plant.tick().torque[1] == torque
+        plant.notice()
+    assert log.lines == ['WARN torques are too old and count as zero: left']
+
+
+# Reset
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_after_a_reset_a_run_repeats_bit_for_bit(variant, log):
+    plant, names = Plant({'variant': variant}, log), NAMES[variant.split('_')[0]]
+
+    def run():
+        result = []
+        for n in range(100):
+            assert plant.take(names, load(n), 'test', stamp=n + 1)
+            result.append(tuple(plant.tick()))
+        return result
+    first = run()
+    plant.reset()
+    assert plant.inputs.silent() == list(names)
+    assert plant.simulation.snapshot() == Plant({'variant': variant}, log).simulation.snapshot()
+    assert run() == first
+    assert plant.ticks == 200
+
+
+# Parameters
+
+
+@pytest.mark.parametrize('bad, why', [
+    ({'lsd.pressure_angle': 9.0}, r'lsd.pressure_angle: 9.0 is not allowed'),
+    ({'lsd.clutch.front.radius': 1e6}, r'lsd.clutch.front'),
+    ({'torque_limit': -1.0}, r'torque_limit: -1.0 is not allowed'),
+    ({'substeps': 0}, r'substeps: 0 is not allowed'),
+    ({'rate': 100.0}, r'rate: it cannot be changed while it runs'),
+    ({'loss_law': 'paper'}, r'loss_law: it cannot be changed while it runs'),
+    ({'symmetric.inertia.left': 1.0}, r'symmetric.inertia.left: there is no such parameter')])
+def test_a_change_with_one_impossible_parameter_changes_nothing(lockstep, bad, why):
+    lockstep.take(('carrier',), (3.0,), 'test')
+    lockstep.tick()
+    before = in_force(lockstep)
+    with pytest.raises(ValueError, match=why):
+        lockstep.prepared({'lsd.clutch.rear.preload': 50.0, 'torque_limit': 7.0, 'substeps': 3,
+                           'initial_velocity.front': 1.0, **bad})
+    assert in_force(lockstep) == before
+
+
+def test_a_change_is_in_force_as_it_is_adopted_and_not_before(log):
+    plant = Plant({'variant': 'lsd_ode', 'initial_velocity.front': 50.0,
+                   'initial_velocity.rear': 40.0}, log)
+    changes = {'lsd.crown_radius.rear': 0.07, 'lsd.clutch.rear.radius': 0.07, 'substeps': 3,
+               'torque_limit': 7.0, 'torque_timeout': 0.1, 'power_flow_deadband': 2.0,
+               'initial_velocity.rear': 1.0}
+    before, values = in_force(plant), plant.values
+    prepared = plant.prepared(changes)
+    assert in_force(plant) == before and plant.values == values
+    snapshot = plant.simulation.snapshot()
+    plant.adopt(prepared)
+    assert plant.values == {**values, **changes}
+    simulation, inputs = plant.simulation, plant.inputs
+    assert (simulation.substeps, simulation.power_flow_deadband) == (3, 2.0)
+    assert simulation.initial_velocity == (50.0, 1.0)
+    assert (inputs.limit, inputs.timeout) == (7.0, 0.1 * 200.0)
+    after = simulation.snapshot()
+    assert after.position == snapshot.position
+    assert after.velocity[1:3] == pytest.approx(snapshot.velocity[1:3], rel=1e-14)
+
+
+# Conditions
+
+
+def test_a_condition_is_logged_once_when_it_begins_and_once_when_it_is_over(log):
+    condition = Condition('torques are clamped', log)
+    for _ in range(3):
+        condition.happened('beyond 1 N m')
+        condition.settle()
+    condition.happened('beyond 2 N m', times=4)
+    assert condition.active and condition.reason == 'beyond 2 N m'
+    for _ in range(3):
+        condition.settle()
+    assert not condition.active
+    begin = 'WARN torques are clamped: beyond 1 N m'
+    assert log.lines == [begin, 'INFO over: torques are clamped (7 in all)']
+    condition.happened('beyond 1 N m')
+    assert log.lines[2:] == [begin]
+
+
+def test_conditions_of_a_plant_begin_and_end_once(log):
+    plant = Plant({'rate': 100.0, 'torque_timeout': 0.05}, log)
+    for torque in (float('nan'), 1e9, 1.0):
+        for _ in range(3):
+            plant.take(('left',), (torque,), 'test')
+    for _ in range(3):
+        for _ in range(10):
+            plant.tick()
+        plant.notice()
+        plant.settle()
+    assert log.lines == [
+        'WARN torque messages are refused: test: the torque on left is nan',
+        'WARN torques are clamped: test: beyond 100000 N m',
+        'WARN torques are too old and count as zero: left',
+        'INFO over: torque messages are refused (3 in all)',
+        'INFO over: torques are clamped (3 in all)']
+    plant.reset()
+    for _ in range(2):
+        plant.notice()
+        plant.settle()
+    assert log.lines[5:] == ['INFO over: torques are too old and count as zero (3 in all)']
