@@ -11,6 +11,7 @@ import matplotlib.figure  # noqa: F401
 import pytest
 
 from dm_ros import Simulation
+from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.testing import DirectDifferential
 
 pytest_plugins = ['pytester']
@@ -30,6 +31,20 @@ def test_a_direct_run_is_the_simulation_with_the_law_between_the_ticks(direct_di
         assert record.moment['rear_clutch'][n] == snapshot.moment[3]
     assert len(record) == 100
     assert record.time[-1] == 0.2
+
+
+def test_a_direct_run_goes_by_the_law_of_losses_that_is_asked_for(direct_differential):
+    torques, ends = (5.0, -10.0, -10.0), set()
+    for loss_law in LOSS_LAWS:
+        vehicle = direct_differential(loss_law=loss_law)
+        record = vehicle.run(lambda snapshot: torques, seconds=0.2)
+        simulation = Simulation('symmetric_ode', 1e-3, loss_law=loss_law)
+        for n in range(200):
+            assert record.velocity['left'][n] == simulation.step(torques).velocity[1]
+        ends.add(record.velocity['left'][-1])
+    assert len(ends) == 2
+    with pytest.raises(ValueError, match="loss_law: 'torsen' is not one of passive, paper"):
+        direct_differential(loss_law='torsen')
 
 
 def test_a_run_ends_when_its_condition_holds_or_its_time_is_over(direct_differential):

@@ -18,6 +18,7 @@ from std_msgs.msg import Int8
 from std_srvs.srv import SetBool, Trigger
 
 from dm_ros import Simulation
+from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.testing import lockstep, LockstepDifferential
 
 BURNER = 'print("burning", flush=True)\nwhile True: pass'
@@ -177,6 +178,31 @@ def test_the_lockstep_run_is_the_direct_run_to_the_last_bit_under_load(variant):
         snapshot = simulation.step(T)
         assert tuple(record.columns[f'velocity.{shaft}'][n] for shaft in simulation.shafts) \
             == snapshot.velocity
+
+
+@pytest.mark.parametrize('loss_law', LOSS_LAWS)
+def test_the_node_runs_by_the_law_of_losses_that_is_asked_for(differential, loss_law):
+    vehicle = differential('lsd_ode', parameters={'loss_law': loss_law})
+    vehicle.attach(Controller(vehicle.context))
+    record = vehicle.run(seconds=0.2)
+    runs = {}
+    for law in LOSS_LAWS:
+        simulation, runs[law] = Simulation('lsd_ode', 1e-3, loss_law=law), []
+        snapshot = simulation.snapshot()
+        for n in range(1, 201):
+            T_0, T_1, T_2 = load(n)
+            snapshot = simulation.step((T_0 - snapshot.velocity[0], T_1, T_2))
+            runs[law].append((*snapshot.velocity, *snapshot.moment))
+    passive, paper = runs.values()
+    assert passive[-1] != paper[-1]
+    names = [f'velocity.{shaft}' for shaft in simulation.shafts]
+    names += [f'moment.{moment}' for moment in simulation.moments]
+    assert list(zip(*(record.columns[name] for name in names))) == runs[loss_law]
+
+
+def test_a_law_of_losses_that_is_unknown_is_refused_and_named(differential):
+    with pytest.raises(ValueError, match="loss_law: 'torsen' is not allowed.*passive, paper"):
+        differential('lsd_ode', parameters={'loss_law': 'torsen'})
 
 
 def test_a_run_ends_to_the_tick_and_says_so_when_nobody_answers(monkeypatch):

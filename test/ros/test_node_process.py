@@ -42,6 +42,7 @@ def test_its_parameter_file_loads(ros, name):
     ('rate:=0.0', ['rate', '0.0']),
     ('rate:=100', ['rate', '100', 'double']),
     ('variant:=torsen', ['variant', 'torsen', 'lsd_ode']),
+    ('loss_law:=torsen', ['loss_law', 'torsen', 'passive, paper']),
     ('symmetric.inertia.wheel:=1.0', ['symmetric.inertia.wheel']),
 ])
 def test_an_unknown_or_impossible_parameter_ends_it_with_code_2_and_one_line(
