@@ -11,8 +11,9 @@ program drives it by the same methods. It knows no ROS, no clock and no thread: 
 
 from typing import NamedTuple
 
-from dm_ros.motion.energy import AuditedSimulation
+from dm_ros.motion.energy import AuditedSimulation, given_back
 from dm_ros.motion.held_inputs import HeldInputs
+from dm_ros.motion.models import PAPER
 from dm_ros.motion.simulation import Simulation
 from dm_ros.settings import make_simulation, NodeParameters
 
@@ -29,13 +30,16 @@ class Condition:
         self._log = log
         self._settled = 0
 
+    def __str__(self):
+        return f'{self.what}: {self.reason}'
+
     def happened(self, reason, times=1):
         """Count it, and log it if it begins now."""
         self.count += times
         self.reason = reason
         if not self.active:
             self.active = True
-            self._log.warning(f'{self.what}: {reason}')
+            self._log.warning(str(self))
 
     def settle(self):
         """Log its end if it did not happen since the last call; to be called at 1 Hz."""
@@ -73,6 +77,7 @@ class Plant:
         self.stale = Condition('torques are too old and count as zero', log)
         self.out_of_range = Condition('ticks are refused', log)
         self.coarse = Condition('solver steps are coarse', log)
+        self.motoring = Condition('gears and bearings give energy back, as motors', log)
         self.reset()
         self.adopt(self.prepared({}))
 
@@ -125,6 +130,7 @@ class Plant:
         self.inputs.forget()
         self._last_stamp = 0
         self._coarse_before = 0
+        self._books_before = self._books()
 
     def prepared(self, changes):
         """
@@ -170,9 +176,20 @@ class Plant:
         stale = self.inputs.stale(self.simulation.ticks)
         if stale:
             self.stale.happened(', '.join(stale))
+        before, self._books_before = self._books_before, self._books()
+        if self._books_before and (energy := given_back(before, self._books_before)):
+            self.motoring.happened(
+                f"{energy:.3g} J since the last report: the paper's law of losses does that where "
+                'power does not run all one way; loss_law: passive does not')
 
     def settle(self):
         """Let the conditions end that are over; to be called at 1 Hz, after ``notice``."""
         for condition in (self.refusing, self.clamping, self.stale, self.out_of_range,
-                          self.coarse):
+                          self.coarse, self.motoring):
             condition.settle()
+
+    def _books(self):
+        """Return all that was lost under the law whose losses may be gains, None if it is not."""
+        simulation = self.simulation
+        return simulation.total if (
+            self.settings.energy_audit and simulation.loss_law == PAPER) else None

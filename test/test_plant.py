@@ -6,6 +6,9 @@
 import pytest
 
 from dm_ros import Simulation, VARIANTS
+from dm_ros.energy import Energy
+from dm_ros.mechanism.variants import SYMMETRIC
+from dm_ros.motion.energy import given_back, Layout
 from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.plant import Condition, Plant
 
@@ -254,3 +257,93 @@ def test_conditions_of_a_plant_begin_and_end_once(log):
         plant.notice()
         plant.settle()
     assert log.lines[5:] == ['INFO over: torques are too old and count as zero (3 in all)']
+
+
+# Gears and bearings that give energy back
+
+
+def cruise(variant, loss_law, log, seconds=4):
+    """Return a ``Plant`` after a governor held 20 rad/s against 100 N m on each wheel."""
+    mechanism = variant.split('_')[0]
+    names, outputs = NAMES[mechanism], NAMES[mechanism][1:]
+    plant = Plant({'variant': variant, 'rate': 1000.0, 'loss_law': loss_law,
+                   'torque_timeout': 0.0,
+                   **{f'{mechanism}.inertia.{shaft}': 1.0 for shaft in outputs},
+                   **{f'initial_velocity.{shaft}': 20.0 for shaft in outputs}}, log)
+    integral, snapshot = 200.0 / (3.517 if mechanism == 'symmetric' else 1.0), None
+    for n in range(seconds * 1000):
+        error = 20.0 - (snapshot.velocity[0] if snapshot else 20.0)
+        integral += 10.0 * error * 0.001
+        plant.take(names, (10.0 * error + integral, -100.0, -100.0), 'test')
+        snapshot = plant.tick()
+        if (n + 1) % 1000 == 0:
+            plant.notice()
+            plant.settle()
+    assert 15.0 < snapshot.velocity[0] < 25.0
+    return plant
+
+
+def test_a_governed_cruise_under_the_law_of_the_paper_warns_until_power_runs_all_one_way(log):
+    plant = cruise('symmetric_ode', 'paper', log)
+    line, = log.lines
+    assert line.startswith('WARN gears and bearings give energy back, as motors: ')
+    assert line.endswith(" J since the last report: the paper's law of losses does that where "
+                         'power does not run all one way; loss_law: passive does not')
+    total = plant.simulation.total
+    given = -sum(total.gears + total.bearings)
+    assert plant.motoring.active and plant.motoring.count == 4
+    assert float(plant.motoring.reason.split()[0]) == pytest.approx(given / 4, rel=0.05)
+    plant.take(('pinion',), (80.0,), 'test')   # more than the losses
+    for _ in range(2):
+        for _ in range(1000):
+            plant.tick()
+        plant.notice()
+        plant.settle()
+    assert log.lines[1:] == ['INFO over: gears and bearings give energy back, as motors '
+                             '(4 in all)']
+
+
+@pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])
+def test_a_governed_cruise_under_the_passive_law_never_warns(variant, log):
+    assert cruise(variant, 'passive', log).motoring.count == 0
+    assert not log.lines
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_whatever_the_load_the_passive_law_never_warns(variant, log):
+    plant, names = Plant({'variant': variant}, log), NAMES[variant.split('_')[0]]
+    for n in range(500):
+        plant.take(names, load(7 * n), 'test')
+        plant.tick()
+        plant.notice()
+    assert plant.motoring.count == 0
+
+
+def test_a_reset_begins_the_books_anew(log):
+    plant = cruise('symmetric_ode', 'paper', log, seconds=1)
+    plant.take(('pinion',), (80.0,), 'test')
+    for _ in range(3000):
+        plant.tick()
+    plant.notice()
+    total = plant.simulation.total
+    assert sum(total.gears + total.bearings) > 0.0 and plant.motoring.count == 1
+    plant.reset()   # takes what was lost out of the books, which is no gain
+    plant.notice()
+    assert plant.motoring.count == 1
+
+
+def test_what_was_given_back_is_the_change_of_both_totals_beyond_rounding():
+    layout = Layout.of(SYMMETRIC)
+
+    def total(gears, bearings, scale):
+        entries = [0.0] * (layout.scale + 1)
+        entries[layout.gears], entries[layout.bearings] = gears, bearings
+        entries[layout.scale] = scale
+        return Energy(tuple(entries), layout)
+    begin = total((10.0, 1.0, 1.0), (1.0, 1.0), 1000.0)
+    assert given_back(begin, begin) == 0.0
+    # the bearings take what the gears give, or nearly
+    assert given_back(begin, total((8.0, 1.0, 1.0), (2.0, 2.0), 1100.0)) == 0.0
+    assert given_back(begin, total((8.0, 1.0, 1.0), (2.0, 1.5), 1100.0)) == 0.5
+    assert given_back(begin, total((10.0 - 1e-10, 1.0, 1.0), (1.0, 1.0), 1100.0)) == 0.0
+    assert given_back(begin, total((10.0, 3.0, 1.0), (1.0, 1.0), 1100.0)) == 0.0

@@ -163,6 +163,16 @@ def rated_efficiency(parameters):
     return parameters.rated_efficiency
 
 
+def given_back(before, after):
+    """
+    Return what gears and bearings together gave back between two totals, J, 0.0 if they took.
+
+    Less than ``NO_LOSS`` of the energy turned over since the start is rounding.
+    """
+    taken = sum(after.gears + after.bearings) - sum(before.gears + before.bearings)
+    return -taken if taken < -NO_LOSS * after.scale else 0.0
+
+
 class AuditedSimulation(Simulation):
     """
     A ``Simulation`` that keeps the books of its energy.

@@ -16,13 +16,13 @@ def status(name, complaints, fine, values):
     """
     Return a DiagnosticStatus.
 
-    :param complaints: the active ``Condition`` s, if any; fine: the message if there is none.
+    :param complaints: what is wrong, in words, if anything; fine: the message if nothing is.
     :param values: mapping from key to value.
     """
     return DiagnosticStatus(
         level=DiagnosticStatus.WARN if complaints else DiagnosticStatus.OK,
         name=name,
-        message='; '.join(condition.what for condition in complaints) or fine,
+        message='; '.join(complaints) or fine,
         hardware_id='dm_ros',
         values=[KeyValue(key=key, value=str(value)) for key, value in values.items()])
 
@@ -112,7 +112,8 @@ class Diagnostics:
             total, worst, simulation.worst = simulation.total, simulation.worst, 0.0
             stored, efficiency = simulation.stored_energy, simulation.tick.efficiency
             returned = dict(simulation.returned)
-        return self._status('energy', [], 'fine', {
+        motoring = self._node.plant.motoring
+        return self._status('energy', [str(motoring)] if motoring.active else [], 'fine', {
             'worst balance residual since the last report [relative]': f'{worst:.1e}',
             'work of the torques [J]': f'{sum(total.work):.6g}',
             'stored [J]': f'{stored:.6g}',
@@ -127,5 +128,5 @@ class Diagnostics:
 
 
 def active(*conditions):
-    """Return those of the conditions that hold now."""
-    return [condition for condition in conditions if condition.active]
+    """Return, in words, those of the conditions that hold now."""
+    return [condition.what for condition in conditions if condition.active]

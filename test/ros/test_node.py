@@ -7,7 +7,7 @@ from array import array
 import math
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -301,6 +301,24 @@ def test_diagnostics_tell_that_the_energy_balances(ros, variant):
         'stored [J]', 'lost by drag [J]', 'lost in gears and bearings [J]',
         'lost in clutches [J]'))
     assert spent == pytest.approx(float(energy['work of the torques [J]']), rel=1e-4)
+
+
+def test_diagnostics_warn_while_gears_and_bearings_give_energy_back(ros):
+    ros.differential(
+        torque_timeout=0.0, loss_law='paper', initial_velocity__left=20.0,
+        initial_velocity__right=20.0, symmetric__inertia__left=1.0, symmetric__inertia__right=1.0)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    ros.publisher(JointState, '/differential/torques').publish(
+        JointState(name=['pinion', 'left', 'right'], effort=[54.4, -100.0, -100.0]))
+    ros.until(lambda: diagnostics and 'as motors' in keys(diagnostics, 'energy')[1])
+    values, message = keys(diagnostics, 'energy')
+    assert message.startswith('gears and bearings give energy back, as motors: ')
+    assert message.endswith('loss_law: passive does not')
+    status = [status for status in diagnostics[-1].status if status.name.endswith('energy')][0]
+    assert status.level == DiagnosticStatus.WARN
+    assert float(values['lost in gears and bearings [J]']) < 0.0
+    ros.call(SetBool, '/differential/pause', data=True)
+    ros.until(lambda: keys(diagnostics, 'energy')[1] == 'fine')
 
 
 def test_without_the_energy_audit_nothing_is_said_of_energy(ros):
