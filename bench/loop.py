@@ -119,7 +119,7 @@ def python_loop(rate, seconds, path):
 def node(rate, variant, path):
     """Run the node until SIGTERM."""
     import rclpy
-    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.executors import SingleThreadedExecutor
     from rclpy.parameter import Parameter
 
     from dm_ros.ros.node import DifferentialNode, SWITCH_INTERVAL
@@ -134,8 +134,9 @@ def node(rate, variant, path):
     differential.start()
     try:
         executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    except Exception:
+        if rclpy.ok():   # otherwise it is the shutdown that broke a call
+            raise
     timeline.write()
     differential.close()
     rclpy.try_shutdown()
