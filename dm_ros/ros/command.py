@@ -7,10 +7,12 @@ import os
 import signal
 import sys
 
+from dm_ros.ending import SIGNALS
+
 
 def main(args=None):
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         signal.signal(number, lambda *_: os._exit(0))   # there is nothing to clean up yet
     from dm_ros.ros.node import main
     return main(args)
