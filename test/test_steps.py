@@ -259,7 +259,8 @@ def test_parts_lead_from_the_start_to_the_end_of_the_step(law):
         assert not straight and at == pytest.approx(y, rel=1e-14)
         assert f == here[:2] and here[:6] == pytest.approx(flow.point(*y)[:6], rel=1e-12)
         assert J == pytest.approx(flow.jacobian(*y)[0], rel=1e-12)
-        assert abs(c[0]) + abs(c[1]) <= adaptive.TOLERANCE + adaptive.RELATIVE * np.abs(d).sum()
+        assert abs(c[0]) + abs(c[1]) <= (
+            adaptive.TOLERANCE + flow.law.relative * np.abs(d).sum())
         at = at + d + c
         assert there[:6] == pytest.approx(flow.point(*at)[:6], rel=1e-9, abs=1e-9)
         whole, turned = whole + h, turned + np.array(angle)
@@ -487,4 +488,4 @@ def test_symmetric_follows_an_adaptive_solver_at_every_tick(torques, rate, count
         (T_0 / 3.517, T_1, T_2) for T_0, T_1, T_2 in torques(
             np.random.default_rng(7), count, 1 / rate, part)))
     assert simulation.coarse_steps == 0
-    assert max(speeds, slip) < 1e-3 and turn < 1e-5
+    assert max(speeds, slip) < 2e-4 and turn < 1e-5

@@ -37,13 +37,15 @@ the Jacobian needs again.
 
 from dataclasses import dataclass
 from itertools import product
-from math import tanh
+from math import isfinite, tanh
 
 from dm_ros.mechanism.clutched import full_friction, slip_steepness
 from dm_ros.mechanism.efficiencies import Efficiencies
 from dm_ros.mechanism.losses import lost_in_bearing
 
 SATURATED = 19.0   # times mesh_sign_speed: above, sigma is 1 to rounding
+STRAIGHT = 0.02    # change of a sigma or t_k over which the equations are nearly linear
+TINY = 1e-280      # determinant, with which the range of floating point ends
 ROUNDS = 8         # of looking for the signs, before all patterns are tried
 PATTERNS = tuple(product((1.0, -1.0), (1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (1.0, 0.0)))
 
@@ -101,6 +103,21 @@ def coefficients(p, clutches, proportional=True):
         (1 + p.eta_1G) / 2, (1 + p.eta_2G) / 2, (1 + eta_F) / 2,
         (1 - p.eta_1G) / 2, (1 - p.eta_2G) / 2, (1 - eta_F) / 2,
         lost_in_bearing(p.eta_0B), lost_in_bearing(eta_3B), *a, *phi)
+
+
+def has_solutions(k):
+    """Return whether the numbers of all sets of signs stay in the range of floating point."""
+    u = 1.0, 1.0, 1.0, 0.0, 0.0
+    try:
+        for turned in (1.0, -1.0):
+            state = 1.0, turned, 1.0, 1.0, 1.0, turned, -turned
+            for signs in PATTERNS:
+                _, _, point = solve(k, u, -1.0, -1.0, state, signs)
+                if not (point[-1][-1] > TINY and isfinite(sum(point[:7]))):
+                    return False
+    except ArithmeticError:
+        return False
+    return True
 
 
 def held(T, S):
@@ -251,6 +268,25 @@ def jacobian(k, u, point):
     r_s = k.g_12 * (n_1s * M_1 + n_1 * M_1s) - n_2s * M_2 - n_2 * M_2s + k.l_s
     return ((G_12 * r_w - G_22 * g_w) / det, (G_12 * r_s - G_22 * g_s) / det,
             (G_21 * g_w - G_11 * r_w) / det, (G_21 * g_s - G_11 * r_s) / det), None
+
+
+def bends(k, here, there):
+    """
+    Return whether the motion from one point to another may be far from linear in between.
+
+    It is not where the signs stay, no sigma and no t_k changes much, and no speed has turned
+    round: of two modes together none does so more than once.
+    """
+    v_w, v_s, _, _, _, _, _, signs, (_, _, a, b, c, d, e), _ = here
+    w_w, w_s, _, _, _, _, _, signs_there, (_, _, f, g, h, i, j), _ = there
+    return not (
+        signs == signs_there
+        and -STRAIGHT < f - a < STRAIGHT and -STRAIGHT < g - b < STRAIGHT
+        and -STRAIGHT < h - c < STRAIGHT and -STRAIGHT < i - d < STRAIGHT
+        and -STRAIGHT < j - e < STRAIGHT
+        and v_w * w_w >= 0.0 and v_s * w_s >= 0.0
+        and (v_w + k.k_1 * v_s) * (w_w + k.k_1 * w_s) >= 0.0
+        and (v_w - k.k_2 * v_s) * (w_w - k.k_2 * w_s) >= 0.0)
 
 
 def lost_powers(k, u, point):

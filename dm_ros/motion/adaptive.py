@@ -15,7 +15,7 @@ its Jacobian J and Z = h J,
 phi_1 takes the stiff clutch for what it is, so a locked or a fully slipping clutch takes one
 part, whatever the torque. Where slip reverses or starts, the part shrinks until the estimate
 fits. c may vanish by chance where slip crosses the whole of tanh, so the same estimate, seen
-from the end of the part, must fit as well. The work is bounded: after as many trials as a law
+from the end of the part, must fit as well, unless the law knows that nothing bends. The work is bounded: after as many trials as a law
 may take the rest of the step is its last resort, one Euler step, stable but coarse.
 
 All works in plain floats: on 2x2 systems that is several times faster than arrays.
@@ -29,7 +29,6 @@ from dm_ros.mechanism import clutched, passive
 from dm_ros.motion.exponentials import apply_phi_2
 
 TOLERANCE = 1e-4        # rad/s, error estimate allowed in one part
-RELATIVE = 1e-6         # of the change of speed in the part
 BACKWARD = 3.0          # times that, for the estimate seen from the end
 SAFETY, SHRINK, GROW = 0.8, 0.1, 5.0
 
@@ -41,6 +40,8 @@ class Law(NamedTuple):
     jacobian: Callable      # (k, u, point) -> (J_ww, J_ws, J_sw, J_ss) and what else it knows
     last_resort: Callable   # (law, k, u, y, J, h) -> y and its integral after a step of any length
     most_trials: int
+    relative: float         # error estimate allowed besides, of the change of speed in a part
+    bends: Callable         # (k, point, point) -> whether the motion may be nonlinear in between
 
 
 def rosenbrock_part(law, k, u, w, s, here, J, h):
@@ -139,17 +140,17 @@ def implicit_euler(law, k, u, y, J, h):
     return (w, s), (h * w, h * s)
 
 
-PAPER = Law(clutched.evaluate, clutched.jacobian, backward_euler, 200)
-PASSIVE = Law(passive.evaluate, passive.jacobian, implicit_euler, 400)
+PAPER = Law(clutched.evaluate, clutched.jacobian, backward_euler, 200, 1e-6, lambda *_: True)
+PASSIVE = Law(passive.evaluate, passive.jacobian, implicit_euler, 400, 1e-7, passive.bends)
 
 
-def step(law, k, u, y, h, tolerance=TOLERANCE):
+def step(law, k, u, y, h, tolerance=TOLERANCE, here=None):
     """
     Return ``(y, integral of y, point, coarse, parts)`` at the end of a step.
 
     :param law: PAPER or PASSIVE; k: its coefficients; u: what its ``held`` makes of the inputs.
     :param y: ``(omega_0, omega_1 - omega_2)``, rad/s; h: length of the step, s.
-    :param tolerance: rad/s, error estimate allowed in one part.
+    :param tolerance: rad/s, error estimate allowed in one part; here: the point at y, if known.
     :return: whether the step was coarse, and the parts of its path, each ``(y, f, J, more, h, d,
         c, integral, straight, here, there)``: within a part of length h the path is
         y + q + c (t/h)^3 with q = t phi_1(t J) f, which is d at its end; or, of the last resort,
@@ -161,17 +162,19 @@ def step(law, k, u, y, h, tolerance=TOLERANCE):
     angle_w = angle_s = 0.0
     left = part = h
     parts = []
-    here = evaluate(k, u, w, s)
+    here = here or evaluate(k, u, w, s)
     J, more = jacobian(k, u, here)
     for _ in range(law.most_trials):
         (d_w, d_s), (i_w, i_s), (c_w, c_s) = rosenbrock_part(law, k, u, w, s, here, J, part)
-        allowed = tolerance + RELATIVE * (abs(d_w) + abs(d_s))
+        allowed = tolerance + law.relative * (abs(d_w) + abs(d_s))
         error = (abs(c_w) + abs(c_s)) / allowed
         if error <= 1.0:
             there = evaluate(k, u, w + d_w + c_w, s + d_s + c_s)
-            J_there, more_there = jacobian(k, u, there)
-            r_w, r_s = nonlinear_part(there, here, J_there, -part, -d_w - c_w, -d_s - c_s)
-            error = max(error, (abs(r_w) + abs(r_s)) / (BACKWARD * allowed))
+            J_there = None
+            if law.bends(k, here, there):
+                J_there, more_there = jacobian(k, u, there)
+                r_w, r_s = nonlinear_part(there, here, J_there, -part, -d_w - c_w, -d_s - c_s)
+                error = max(error, (abs(r_w) + abs(r_s)) / (BACKWARD * allowed))
         if error <= 1.0:
             i_w += part * c_w / 4
             i_s += part * c_s / 4
@@ -181,10 +184,11 @@ def step(law, k, u, y, h, tolerance=TOLERANCE):
             angle_s += i_s
             w += d_w + c_w
             s += d_s + c_s
-            here, J, more = there, J_there, more_there
             left -= part
             if left <= 0.0:
-                return (w, s), (angle_w, angle_s), here, False, parts
+                return (w, s), (angle_w, angle_s), there, False, parts
+            J, more = (J_there, more_there) if J_there else jacobian(k, u, there)
+            here = there
         scale = SAFETY * error ** (-1 / 3) if error > 1e-3 else GROW
         part *= min(GROW, max(SHRINK, scale))
         if part > 0.999 * left:

@@ -36,9 +36,14 @@ def responses_of(formulation, parameters):
         except (ArithmeticError, np.linalg.LinAlgError):
             responses = {}
     if not responses or not all(np.isfinite(m).all() for r in responses.values() for m in r):
-        raise ValueError(f'{parameters.prefix}: the equations of these parameters have no '
-                         'finite solution, some are too large or too small beside the others')
+        raise no_solution(parameters)
     return responses
+
+
+def no_solution(parameters):
+    """Return the error of parameters that are not fit for floating point numbers."""
+    return ValueError(f'{parameters.prefix}: the equations of these parameters have no finite '
+                      'solution, some are too large or too small beside the others')
 
 
 class SymmetricModel:
@@ -159,11 +164,12 @@ class PassiveModel:
         responses_of(formulation, parameters)   # refuses what overflows
         clutches = bool(mechanism.clutches)
         self.k = passive.coefficients(parameters, clutches, not self.lagged)
+        if not passive.has_solutions(self.k):
+            raise no_solution(parameters)
         self._phi, self._preload = (clutched.full_friction(parameters) if clutches
                                     else ((0.0, 0.0), (0.0, 0.0)))
-        self._driven = not self.k.g_F
         self._g_2s = parameters.g_2s
-        self._tolerance = adaptive.TOLERANCE / 5 if self.lagged else adaptive.TOLERANCE
+        self._tolerance = adaptive.TOLERANCE / 5   # signs that turn round make kinks
 
     def independent(self, omega_1, omega_2):
         """Return x for the given speeds of the output shafts."""
@@ -202,9 +208,9 @@ class PassiveModel:
         _, _, _, _, M_1, M_2, *_ = point
         return abs(M_1), abs(M_2)
 
-    def _adaptive_step(self, x, u, flow):
+    def _adaptive_step(self, x, u, flow, here=None):
         end, integral, point, coarse, parts = adaptive.step(
-            adaptive.PASSIVE, self.k, u, x, self.h, self._tolerance)
+            adaptive.PASSIVE, self.k, u, x, self.h, self._tolerance, here)
         return x, flow, end, integral, point, coarse, (u, parts)
 
     def _friction(self, memory):
@@ -225,24 +231,29 @@ class PassiveSymmetricModel(PassiveModel):
 
     def step(self, x, memory, T, flow):
         """Advance by h; see the module for what is returned."""
-        guess = self._guess
-        done = guess and exact_step(guess, x, T)
-        if not done:
-            u = passive.held(T, self._preload)
-            pattern = self._patterns.at(u, passive.evaluate(self.k, u, *x))
-            done = pattern and pattern is not guess and exact_step(pattern, x, T)
-            self._guess = guess = pattern or guess
-        if done:
-            end, integral = done
-            return x, flow, end, integral, guess, False, guess
-        x, flow, end, integral, point, coarse, path = self._adaptive_step(x, u, flow)
-        return x, flow, end, integral, self._patterns.at(u, point) or point, coarse, path
+        u, here = passive.held(T, self._preload), None
+        patterns = self._patterns
+        if patterns.has_one_at(x):
+            guess = self._guess
+            done = guess and exact_step(guess, x, T)
+            if not done:
+                here = passive.evaluate(self.k, u, *x)
+                pattern = patterns.of(u, here)
+                done = pattern and pattern is not guess and exact_step(pattern, x, T)
+                self._guess = guess = pattern or guess
+            if done:
+                end, integral = done
+                return x, flow, end, integral, guess, False, guess
+        x, flow, end, integral, point, coarse, path = self._adaptive_step(x, u, flow, here)
+        return x, flow, end, integral, self._with_pattern(end, u, point), coarse, path
 
     def point(self, x, memory, T, flow):
         """Return the pattern at a state, or its point where there is none."""
         u = passive.held(T, self._preload)
-        point = passive.evaluate(self.k, u, *x)
-        return self._patterns.at(u, point) or point
+        return self._with_pattern(x, u, passive.evaluate(self.k, u, *x))
+
+    def _with_pattern(self, x, u, point):
+        return self._patterns.has_one_at(x) and self._patterns.of(u, point) or point
 
     def internal_moments(self, x, T, flow, point):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""

@@ -22,6 +22,7 @@ from dm_ros.mechanism.losses import symmetric_drag, SymmetricLosses
 from dm_ros.motion import held_torque
 from dm_ros.motion.quadrature import second_moment_of_the_way
 
+MARGIN = 1e-9   # N m from turning round, within which no pattern is taken
 TO_SLIP = np.array([[0.5, 0.5], [1.0, -1.0]])   # (omega_0, slip) from (omega_1, omega_2)
 
 
@@ -44,14 +45,18 @@ class Patterns:
     def __init__(self, equations, p, k, h):
         self._equations, self._p, self._k, self._h = equations, p, k, h
         self._kept = {}
+        self._fast = passive.SATURATED * k.sign_speed
 
-    def at(self, u, point):
-        """Return the ``Pattern`` at a point, None where some sigma is not 1 or there is none."""
-        _, _, _, _, _, _, _, signs, (w, s, *sigmas, _, _), _ = point
-        k = self._k
-        fast = passive.SATURATED * k.sign_speed
-        if not (abs(w) > fast and abs(w + k.k_1 * s) > fast and abs(w - k.k_2 * s) > fast):
-            return None
+    def has_one_at(self, x):
+        """Return whether the carrier and the outputs are so fast that every sigma is 1 or -1."""
+        w, s = x
+        k_1s, k_2s, fast = self._k.k_1 * s, self._k.k_2 * s, self._fast
+        return ((w > fast or w < -fast) and (w + k_1s > fast or w + k_1s < -fast)
+                and (w - k_2s > fast or w - k_2s < -fast))
+
+    def of(self, u, point):
+        """Return the ``Pattern`` at a point where all is fast, None where there is none."""
+        _, _, _, _, _, _, _, signs, (_, _, *sigmas, _, _), _ = point
         key = (*sigmas, *signs, u[0] >= 0.0)
         if key not in self._kept:
             self._kept[key] = self._pattern(point, 1.0 if u[0] >= 0.0 else -1.0)
@@ -80,11 +85,10 @@ class Patterns:
         input_brakes = float(sigma_0 * p.g_F * input_sign < 0.0)
         drag = np.array([k.l_0, -k.l_1 * k.k_1 + k.l_2 * k.k_2, 0.0, 0.0, 0.0])
         bracket = sigma_0 * (drag + h_N * N - brakes * c_F * M_F)
-        fast = passive.SATURATED * k.sign_speed
         speeds = np.array([[1.0, 0.0], [1.0, k.k_1], [1.0, -k.k_2]])
-        kept = [(*(sigma * row), 0.0, 0.0, 0.0, fast)
+        kept = [(*(sigma * row), 0.0, 0.0, 0.0, self._fast)
                 for sigma, row in zip((sigma_0, sigma_1, sigma_2), speeds)]
-        kept += [(*row, 0.0) for row in (
+        kept += [(*row, MARGIN) for row in (
             s_F * M_F, s_1 * M_1, s_2 * M_2, (2 * h_N - 1) * sigma_0 * N, (2 * b - 1) * bracket)]
         reach = reach_of_slopes(A, self._h)
         if not (np.isfinite(kept).all() and np.isfinite(rows).all() and reach):
