@@ -15,8 +15,9 @@ its Jacobian J and Z = h J,
 phi_1 takes the stiff clutch for what it is, so a locked or a fully slipping clutch takes one
 part, whatever the torque. Where slip reverses or starts, the part shrinks until the estimate
 fits. c may vanish by chance where slip crosses the whole of tanh, so the same estimate, seen
-from the end of the part, must fit as well, unless the law knows that nothing bends. The work is bounded: after as many trials as a law
-may take the rest of the step is its last resort, one Euler step, stable but coarse.
+from the end of the part, must fit as well, unless the law knows that nothing bends. The work is
+bounded: after as many trials as a law may take the rest of the step is its last resort, one Euler
+step, stable but coarse.
 
 All works in plain floats: on 2x2 systems that is several times faster than arrays.
 """
