@@ -10,11 +10,13 @@ The power-flow index is decided at the start of each tick, from the yardstick's 
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import odeint
 
+from dm_ros.mechanism import clutched, passive
 from dm_ros.mechanism.parameters import SelfLockingParameters
-from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE
+from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
 from dm_ros.mechanism.symmetric import SymmetricOde
-from dm_ros.tools.comparison.reference import exact_self_locking, exponential
+from dm_ros.tools.comparison.reference import exact_self_locking, exponential, TOLERANCE
 
 
 class Trajectory(NamedTuple):
@@ -67,6 +69,34 @@ def symmetric_trajectory(p, load, dt):
     speeds, angles = np.array(rows)[:, :2], np.array(rows)[:, 2:]
     return Trajectory(*(np.column_stack([pair.mean(axis=1), pair]) for pair in (speeds, angles)),
                       np.array(index))
+
+
+def passive_trajectory(p, load, dt, lagged=False):
+    """
+    Return the ``Trajectory`` under the passive law by LSODA, begun anew in each tick.
+
+    :param lagged: as for ``clutch_trajectory``.
+    """
+    clutches = isinstance(p, SelfLockingParameters)
+    k = passive.coefficients(p, clutches, not lagged)
+    phi, S = clutched.full_friction(p) if clutches else ((0.0, 0.0), (0.0, 0.0))
+    w, s, direction, friction = 0.0, 0.0, DIRECT, S
+    rows, index = [], []
+    for T in load:
+        direction = who_drives(T[0] * (k.g_F or 1.0) * w, abs(w) > k.sign_speed, 0.0, direction)
+        u = passive.held(T, friction)
+
+        def f(t, y, u=u):
+            return passive.evaluate(k, u, float(y[0]), float(y[1]))[:2]
+
+        w, s = odeint(f, (w, s), (0.0, dt), tfirst=True, rtol=TOLERANCE, atol=TOLERANCE,
+                      mxstep=100_000)[-1].tolist()
+        if lagged:
+            _, _, _, _, M_1, M_2, *_ = passive.evaluate(k, u, w, s)
+            friction = phi[0] * abs(M_1) + S[0], phi[1] * abs(M_2) + S[1]
+        rows.append((w, s))
+        index.append(direction)
+    return Trajectory(three_shafts(p, *np.array(rows).T), None, np.array(index))
 
 
 def trajectory_of(simulation, load):

@@ -19,17 +19,25 @@ from typing import Callable, NamedTuple
 import numpy as np
 import peers
 from peers import AllHinges, Control, lossless, MatrixPair, SolveIvp, TwoHinges, TwoHingesRead
-from reference import clutch_trajectory, largest_error, symmetric_trajectory, trajectory_of
+from reference import (
+    clutch_trajectory,
+    largest_error,
+    passive_trajectory,
+    symmetric_trajectory,
+    trajectory_of,
+)
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters
 from dm_ros.energy import AuditedSimulation
 from dm_ros.mechanism.variants import CATALOGUE, MECHANISMS, SYMMETRIC
+from dm_ros.motion.models import PAPER, PASSIVE
 from dm_ros.tools.progress import progress
 
 DT = 1e-3            # s, of the cost table
 SLOW_PASSES = 3      # of the rows with solve_ivp
 RIGHT = 1e-3         # rad/s: a peer with a larger error is fast but wrong
 NOTHING = '-'
+LAWS = PAPER, PASSIVE   # of losses; ratios are to the first
 # the heads of the tables, as doc/performance.md has them
 COSTS = ['cost of a tick', 'mean, us', 'ratio', 'p99.9, us', 'worst tick, us', 'max, us',
          'error, rad/s', 'slip error, rad/s']
@@ -51,6 +59,7 @@ the exact solution under held torques.
 
 - step: `Simulation.step`, with the snapshot. bare: `Simulation.advance`, without. With books:
   `AuditedSimulation.step`, which tells where the energy of the tick went.
+- passive, paper: the law of losses; where none is named, it is the paper's.
 - lossless: the numpy pair and MuJoCo know no efficiencies; in their yardstick all are 1.
 - numpy matvec pair: Phi x + Gamma u and no more, without the index of power flow.
 - python-control: `dynamics` and `output` of a discrete system for each direction, with the index.
@@ -110,19 +119,21 @@ def all_rows():
     rows = []
     for kind, method, word in ((Simulation, 'step', 'step'), (Simulation, 'advance', 'bare'),
                                (AuditedSimulation, 'step', 'step with books')):
-        for variant in CATALOGUE.values():
-            name, mechanism = variant.name, variant.mechanism.name
-            rows.append(Row(f'{name}, {word}', mechanism,
-                            name if name == 'lsd_lagged' else mechanism,
-                            lambda v=name, m=method, k=kind: Ours(k(v, DT), m),
-                            per_tick=method == 'step'))
+        for law in LAWS:
+            for variant in CATALOGUE.values():
+                name, mechanism = variant.name, variant.mechanism.name
+                rows.append(Row(
+                    f'{name} {law}, {word}', mechanism,
+                    f'{name if name == "lsd_lagged" else mechanism} {law}',
+                    lambda v=name, w=law, m=method, k=kind: Ours(k(v, DT, loss_law=w), m),
+                    per_tick=method == 'step'))
     rows.append(Row('symmetric: numpy matvec pair, lossless', 'symmetric', 'symmetric lossless',
                     lambda: MatrixPair(p, DT)))
-    rows.append(Row('symmetric: python-control, discrete', 'symmetric', 'symmetric',
+    rows.append(Row('symmetric: python-control, discrete', 'symmetric', 'symmetric paper',
                     lambda: Control(p, DT), Control.missing))
-    rows.append(Row('symmetric: solve_ivp', 'symmetric', 'symmetric', lambda: SolveIvp(p, DT),
-                    slow=True))
-    rows.append(Row('lsd: solve_ivp', 'lsd', 'lsd', lambda: SolveIvp(q, DT), slow=True))
+    rows.append(Row('symmetric: solve_ivp', 'symmetric', 'symmetric paper',
+                    lambda: SolveIvp(p, DT), slow=True))
+    rows.append(Row('lsd: solve_ivp', 'lsd', 'lsd paper', lambda: SolveIvp(q, DT), slow=True))
 
     def mujoco(mechanism, parameters, name, kind, integrator, clutch=None):
         words = f', clutch {clutch}' if clutch else ''
@@ -145,12 +156,15 @@ def yardsticks(loads, bar):
     """Return the exact speeds over the reference loads, by the key of the rows."""
     p, q = SymmetricParameters(), SelfLockingParameters()
     makers = {   # and the load of which mechanism
-        'symmetric': ('symmetric', lambda load: symmetric_trajectory(p, load, DT)),
+        'symmetric paper': ('symmetric', lambda load: symmetric_trajectory(p, load, DT)),
+        'symmetric passive': ('symmetric', lambda load: passive_trajectory(p, load, DT)),
         'symmetric lossless': ('symmetric', lambda load: symmetric_trajectory(
             lossless(p), load, DT)),
-        'lsd': ('lsd', lambda load: clutch_trajectory(q, load, DT)),
+        'lsd paper': ('lsd', lambda load: clutch_trajectory(q, load, DT)),
+        'lsd passive': ('lsd', lambda load: passive_trajectory(q, load, DT)),
         'lsd lossless': ('lsd', lambda load: clutch_trajectory(lossless(q), load, DT)),
-        'lsd_lagged': ('lsd', lambda load: clutch_trajectory(q, load, DT, lagged=True))}
+        'lsd_lagged paper': ('lsd', lambda load: clutch_trajectory(q, load, DT, lagged=True)),
+        'lsd_lagged passive': ('lsd', lambda load: passive_trajectory(q, load, DT, lagged=True))}
     exact = {}
     for key, (mechanism, make) in makers.items():
         exact[key] = make(loads[mechanism]).speeds
@@ -255,40 +269,47 @@ def print_targets(costs):
     def target(words, measured, holds):
         lines.append([words, measured, 'yes' if holds else 'no'])
 
-    def beside_mujoco(words, names):
+    def beside_mujoco(law, words, names):
         if not names:
-            lines.append([f'symmetric_ode beside {words}', NOTHING, NOTHING])
+            lines.append([f'symmetric_ode {law} beside {words}', NOTHING, NOTHING])
             return
         name = min(names, key=lambda n: costs[n].mean)
         peer = costs[name]
         short = name.removeprefix('symmetric: ').removesuffix(', lossless')
         short = f'({short}, error {error_text(peer.error[0])} rad/s)'
         for ours, share, said in (('step', 1, '<= '), ('bare', 1 / 3, '<= a third of ')):
-            own = costs[f'symmetric_ode, {ours}'].mean
-            target(f'symmetric_ode, {ours} {said}{words} {short}',
+            own = costs[f'symmetric_ode {law}, {ours}'].mean
+            target(f'symmetric_ode {law}, {ours} {said}{words} {short}',
                    f'{microseconds(own)} of {microseconds(peer.mean)} us',
                    own <= share * peer.mean)
 
+    def at_most(times, ours, theirs, words):
+        ratio = costs[ours].mean / costs[theirs].mean
+        target(f'{ours} <= {times:g} times {words}', f'{ratio:.2f} times', ratio <= times)
+
     found = [name for name in costs if name.startswith('symmetric: MuJoCo')
              and ' read,' not in name]
-    beside_mujoco('the cheapest mj_step', found)
-    beside_mujoco('the cheapest mj_step of five hinges', [n for n in found if 'five' in n])
-    beside_mujoco(f'the cheapest mj_step right to {RIGHT:g} rad/s',
-                  [n for n in found if costs[n].error[0] < RIGHT])
-    own = costs['lsd_ode, step']
-    target('lsd_ode, step: mean <= 15 us', f'{microseconds(own.mean)} us', own.mean <= 15e-6)
-    target('lsd_ode, step: worst tick < 300 us', f'{microseconds(own.worst)} us',
-           own.worst < 300e-6)
-    target('lsd_ode, step: max < 300 us, whatever else the machine does',
-           f'{microseconds(own.most)} us', own.most < 300e-6)
-    for variant, most in (('symmetric_ode', 2.0), ('lsd_ode', 1.6)):
-        ratio = (costs[f'{variant}, step with books'].mean / costs[f'{variant}, step'].mean)
-        target(f'{variant}, step with books <= {most:g} times without', f'{ratio:.2f} times',
-               ratio <= most)
-    for kind in ('step', 'bare'):
-        for dae, ode in (('symmetric_dae', 'symmetric_ode'), ('lsd_dae', 'lsd_ode')):
-            ratio = costs[f'{dae}, {kind}'].mean / costs[f'{ode}, {kind}'].mean
-            target(f'{dae}, {kind} <= twice {ode}', f'{ratio:.2f} times', ratio <= 2)
+    for law in LAWS:
+        beside_mujoco(law, 'the cheapest mj_step', found)
+        beside_mujoco(law, 'the cheapest mj_step of five hinges',
+                      [n for n in found if 'five' in n])
+        beside_mujoco(law, f'the cheapest mj_step right to {RIGHT:g} rad/s',
+                      [n for n in found if costs[n].error[0] < RIGHT])
+        own = costs[f'lsd_ode {law}, step']
+        target(f'lsd_ode {law}, step: mean <= 15 us', f'{microseconds(own.mean)} us',
+               own.mean <= 15e-6)
+        target(f'lsd_ode {law}, step: worst tick < 300 us', f'{microseconds(own.worst)} us',
+               own.worst < 300e-6)
+        target(f'lsd_ode {law}, step: max < 300 us, whatever else the machine does',
+               f'{microseconds(own.most)} us', own.most < 300e-6)
+        for variant, most in (('symmetric_ode', 2.0), ('lsd_ode', 1.6)):
+            at_most(most, f'{variant} {law}, step with books', f'{variant} {law}, step',
+                    'without')
+        for kind in ('step', 'bare'):
+            for dae, ode in (('symmetric_dae', 'symmetric_ode'), ('lsd_dae', 'lsd_ode')):
+                at_most(2, f'{dae} {law}, {kind}', f'{ode} {law}, {kind}', ode)
+    for variant, most in (('symmetric_ode', 3.0), ('lsd_ode', 2.0)):
+        at_most(most, f'{variant} {PASSIVE}, step', f'{variant} {PAPER}, step', PAPER)
     table(TARGETS, lines)
 
 
@@ -321,38 +342,51 @@ def hard_load(rate):
     return [tuple(float(t) for t in torques) for torques in load]
 
 
+def hard_row(simulation, load, exact, rate, steepness):
+    """Return a row of the table of the hard load."""
+    got = trajectory_of(simulation, load)
+    speed, slip = largest_error(got.speeds, exact.speeds)
+    return [f'{simulation.variant} {simulation.loss_law}', f'{rate} Hz', steepness,
+            error_text(speed), error_text(slip), str((got.index != exact.index).sum()),
+            f'{simulation.coarse_steps} of {len(load)}',
+            'yes' if speed <= 1e-3 and slip <= 1e-2 else 'no']
+
+
 def print_accuracy(bar):
     """Print how exact all variants are."""
-    symmetric, lsd = [], []
+    symmetric, hard = [], []
     for rate in (1000, 100):
         load = [SYMMETRIC.load(n / rate) for n in range(10_000)]
         exact = symmetric_trajectory(SymmetricParameters(), load, 1 / rate)
         for variant in ('symmetric_ode', 'symmetric_dae'):
-            got = trajectory_of(Simulation(variant, 1 / rate), load)
+            got = trajectory_of(Simulation(variant, 1 / rate, loss_law=PAPER), load)
             speeds, angles = (float(np.abs(a - b).max() / np.abs(b).max()) for a, b in
                               ((got.speeds, exact.speeds), (got.angles, exact.angles)))
-            symmetric.append([variant, f'{rate} Hz', error_text(speeds), error_text(angles),
-                              str((got.index != exact.index).sum()),
+            symmetric.append([f'{variant} {PAPER}', f'{rate} Hz', error_text(speeds),
+                              error_text(angles), str((got.index != exact.index).sum()),
                               'yes' if max(speeds, angles) <= 1e-10 else 'no'])
         bar.update()
     for rate in (1000, 200):
         load = hard_load(rate)
         for steepness in (2.0, 4.0, 50.0):
             p = SelfLockingParameters(c_f1=steepness, c_f2=steepness)
-            exact = {lagged: clutch_trajectory(p, load, 1 / rate, lagged)
-                     for lagged in (False, True)}
-            for variant in ('lsd_ode', 'lsd_dae', 'lsd_lagged'):
-                simulation = Simulation(variant, 1 / rate, p)
-                got, best = trajectory_of(simulation, load), exact[variant == 'lsd_lagged']
-                speed, slip = largest_error(got.speeds, best.speeds)
-                lsd.append([variant, f'{rate} Hz', f'{steepness:g}', error_text(speed),
-                            error_text(slip), str((got.index != best.index).sum()),
-                            f'{simulation.coarse_steps} of {len(load)}',
-                            'yes' if speed <= 1e-3 and slip <= 1e-2 else 'no'])
+            for law, trajectory in ((PAPER, clutch_trajectory), (PASSIVE, passive_trajectory)):
+                exact = {lagged: trajectory(p, load, 1 / rate, lagged)
+                         for lagged in (False, True)}
+                for variant in ('lsd_ode', 'lsd_dae', 'lsd_lagged'):
+                    simulation = Simulation(variant, 1 / rate, p, loss_law=law)
+                    hard.append(hard_row(simulation, load, exact[variant == 'lsd_lagged'], rate,
+                                         f'{steepness:g}'))
             bar.update()
+        load = [(T_0 / SymmetricParameters().g_F, T_1, T_2) for T_0, T_1, T_2 in load]
+        exact = passive_trajectory(SymmetricParameters(), load, 1 / rate)
+        for variant in ('symmetric_ode', 'symmetric_dae'):
+            simulation = Simulation(variant, 1 / rate, loss_law=PASSIVE)
+            hard.append(hard_row(simulation, load, exact, rate, NOTHING))
+        bar.update()
     bar.close()
     table(REFERENCE_LOAD, symmetric)
-    table(HARD_LOAD, lsd)
+    table(HARD_LOAD, hard)
 
 
 def machine():
@@ -394,7 +428,7 @@ def main():
     loads = {name: [mechanism.load(n * DT) for n in range(arguments.ticks)]
              for name, mechanism in MECHANISMS.items()}
     peers.silence()
-    bar = progress(total=arguments.passes + 5 + 1 + 8, unit='run')
+    bar = progress(total=arguments.passes + 8 + 1 + 10, unit='run')
     exact = yardsticks(loads, bar)
     errors = {}
     for row in rows:
