@@ -4,6 +4,7 @@
 
 PYTHON = python3
 VARIANT = symmetric_ode
+LOSS_LAW = passive
 DURATION = 10
 RATE = 200
 OUT = run
@@ -57,8 +58,8 @@ setup: .venv/$(ROS)  ## make .venv, with a sourced ROS 2 or else with its wheels
 	env -u PYTHONPATH $(@D)/$(PIP_INSTALL) $($*)
 	touch $@
 
-run: setup  ## run the demo: VARIANT, DURATION in s, RATE in Hz, OUT a folder
-	.venv/bin/demo --variant $(VARIANT) --duration $(DURATION) --rate $(RATE) --out $(OUT)
+run: setup  ## run the demo: VARIANT, LOSS_LAW, DURATION in s, RATE in Hz, OUT a folder
+	.venv/bin/demo --variant $(VARIANT) --loss-law $(LOSS_LAW) --duration $(DURATION) --rate $(RATE) --out $(OUT)
 
 test: setup  ## run the tests: PYTEST_ARGS
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \

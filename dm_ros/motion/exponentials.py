@@ -9,6 +9,8 @@ import math
 import numpy as np
 from scipy.linalg import expm
 
+STEEPEST = 300.0   # growth beyond e to that is refused, but where all rests
+
 
 def held_propagator(A, B, h):
     """
@@ -70,7 +72,7 @@ def phi_2(z):
         return 1 / 2 + z * (1 / 6 + z * (1 / 24 + z * (1 / 120 + z * (1 / 720 + z / 5040))))
     if isinstance(z, complex):
         return (cmath.exp(z) - 1 - z) / (z * z)
-    return (math.expm1(min(z, 300.0)) - z) / (z * z)   # growth beyond e^300 is refused anyway
+    return (math.expm1(min(z, STEEPEST)) - z) / (z * z)
 
 
 def apply_phi_2(z11, z12, z21, z22, v1, v2):
@@ -108,8 +110,8 @@ def way(J, f, h, nodes):
         a_1, a_2 = f_1 - b_1, f_2 - b_2
         for r, _, _, _ in nodes:
             t = h * r
-            slow = math.expm1(high * t) / high if high else t
-            fast = math.expm1(low * t) / low if low else t
+            slow = math.expm1(min(high * t, STEEPEST)) / high if high else t
+            fast = math.expm1(min(low * t, STEEPEST)) / low if low else t
             path.append((a_1 * slow + b_1 * fast, a_2 * slow + b_2 * fast))
     else:
         for r, _, _, _ in nodes:

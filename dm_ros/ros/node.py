@@ -100,7 +100,7 @@ class DifferentialNode(Node):
         self.create_timer(1.0, self.diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.get_logger().info(
             f'{settings.variant} at {settings.rate:g} Hz, {settings.mode}, '
-            f'torques on {", ".join(self.simulation.inputs)}')
+            f'{settings.loss_law} law of losses, torques on {", ".join(self.simulation.inputs)}')
 
     @property
     def simulation(self):

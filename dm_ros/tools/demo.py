@@ -19,6 +19,7 @@ import time
 
 from dm_ros.ending import run_command
 from dm_ros.mechanism.variants import VARIANTS
+from dm_ros.motion.models import LOSS_LAWS, PASSIVE
 from dm_ros.ros.domain import own_domain
 from dm_ros.ros.recorder import Recorder
 from dm_ros.tools.progress import progress
@@ -32,6 +33,8 @@ def parser():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     result.add_argument('--variant', choices=VARIANTS, default='symmetric_ode',
                         help='the mechanism and its formulation')
+    result.add_argument('--loss-law', choices=LOSS_LAWS, default=PASSIVE,
+                        help=f'what gears and bearings lose, default {PASSIVE}')
     result.add_argument('--duration', type=positive, default=10.0, metavar='S',
                         help='length of the recording, default 10')
     result.add_argument('--rate', type=positive, default=200.0, metavar='HZ',
@@ -88,7 +91,7 @@ def run_processes(arguments):
     """Return the recorder after a run of the two processes."""
     namespace = f'/demo_{os.getpid()}'   # even in a shared domain nobody else is heard
     parameters = ['--ros-args', '-r', f'__ns:={namespace}', '-p', f'variant:={arguments.variant}',
-                  '-p', f'rate:={arguments.rate!r}']
+                  '-p', f'rate:={arguments.rate!r}', '-p', f'loss_law:={arguments.loss_law}']
     with Recorder(f'{namespace}/differential', arguments.variant) as recorder:
         with process('ros.command', *parameters) as node:
             wait(recorder.poll, 'state of the differential', node)
@@ -138,7 +141,9 @@ def run(arguments):
     with own_domain() as domain:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         recorder = run_processes(arguments)
-    record = recorder.record(arguments.duration, f'{arguments.variant} at {arguments.rate:g} Hz')
+    record = recorder.record(
+        arguments.duration,
+        f'{arguments.variant} at {arguments.rate:g} Hz, {arguments.loss_law} law of losses')
     csv = arguments.out / f'{arguments.variant}.csv'
     png = arguments.out / f'{arguments.variant}.png'
     record.save_csv(csv)

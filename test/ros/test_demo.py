@@ -14,6 +14,7 @@ from dm_ros.motion.simulation import Simulation
 
 DEMO = command('tools.demo')
 VARIANTS = ('symmetric_dae', 'lsd_lagged')
+LAWS = {'symmetric_dae': 'passive', 'lsd_lagged': 'paper'}
 
 
 @pytest.fixture(scope='module')
@@ -22,7 +23,8 @@ def runs(tmp_path_factory):
     folders = {variant: tmp_path_factory.mktemp(variant) for variant in VARIANTS}
     with ExitStack() as stack:
         demos = {variant: stack.enter_context(Forked(
-            DEMO, '--variant', variant, '--out', folder, '--rate', 100, '--duration', 1))
+            DEMO, '--variant', variant, '--loss-law', LAWS[variant], '--out', folder,
+            '--rate', 100, '--duration', 1))
             for variant, folder in folders.items()}
         return {variant: (folders[variant], demo.ended(), demo.output, demo.errors)
                 for variant, demo in demos.items()}
@@ -39,6 +41,7 @@ def test_runs_beside_each_other_do_not_hear_each_other(runs):
 def test_it_records_what_the_node_publishes_and_draws_it(runs, variant):
     folder, code, output, errors = runs[variant]
     assert code == 0, errors
+    assert f'{LAWS[variant]} law of losses' in errors   # the node says what it is
     for word in ('rate held', 'missed ticks', 'power flow', 'velocity carrier', 'lowest'):
         assert word in output
     with open(folder / f'{variant}.csv', newline='') as file:
