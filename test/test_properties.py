@@ -36,6 +36,11 @@ def test_no_random_differential_breaks_a_law_or_fails(loss_law):
     assert tally.coarse_steps < tally.ticks / 100
 
 
+def test_a_carrier_that_is_flung_does_not_hide_the_error_of_the_slip():
+    # it gains 150,000 rad/s in the tick in which a steep clutch breaks loose
+    Tally('passive').run(57_194)
+
+
 def test_the_books_of_an_equilibrium_whose_jacobian_grows_are_finite():
     # without any torque the signs at M = 0 are arbitrary, and at those signs friction drives
     Tally('passive').run(32_317)

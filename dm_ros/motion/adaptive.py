@@ -142,7 +142,7 @@ def implicit_euler(law, k, u, y, J, h):
 
 
 PAPER = Law(clutched.evaluate, clutched.jacobian, backward_euler, 200, 1e-6, lambda *_: True)
-PASSIVE = Law(passive.evaluate, passive.jacobian, implicit_euler, 400, 1e-7, passive.bends)
+PASSIVE = Law(passive.evaluate, passive.jacobian, implicit_euler, 400, 1e-12, passive.bends)
 
 
 def step(law, k, u, y, h, tolerance=TOLERANCE, here=None):
