@@ -52,7 +52,7 @@ class Clutches:
     """The equations of a self-locking differential, as this package has them."""
 
     def __init__(self, p):
-        self._coefficients = {d: clutched.coefficients(p, SelfLockingOde(p).response(d))
+        self._coefficients = {d: clutched.coefficients(p, SelfLockingOde(p).response(d), direction=d)
                               for d in (DIRECT, REVERSE)}
         self._preload = clutched.full_friction(p)[1]
 
