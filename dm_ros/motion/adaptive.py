@@ -16,7 +16,7 @@ phi_1 takes the stiff clutch for what it is, so a locked or a fully slipping clu
 part, whatever the torque. Where slip reverses or starts, the part shrinks until the estimate
 fits. c may vanish by chance where slip crosses the whole of tanh, so the same estimate, seen
 from the end of the part, must fit as well, unless the law knows that nothing bends. The work is
-bounded: after as many trials as a law may take the rest of the step is its last resort, one Euler
+bounded: after as many trials as a law may take the rest of the step is its last resort, an Euler
 step, stable but coarse.
 
 All works in plain floats: on 2x2 systems that is several times faster than arrays.
@@ -32,6 +32,7 @@ from dm_ros.motion.exponentials import apply_phi_2
 TOLERANCE = 1e-4        # rad/s, error estimate allowed in one part
 BACKWARD = 3.0          # times that, for the estimate seen from the end
 SAFETY, SHRINK, GROW = 0.8, 0.1, 5.0
+MOST_RESORTS = 100      # steps of the last resort, which is halved where it finds no solution
 
 
 class Law(NamedTuple):
@@ -40,6 +41,7 @@ class Law(NamedTuple):
     evaluate: Callable      # (k, u, w, s) -> point, which begins with dw/dt, ds/dt
     jacobian: Callable      # (k, u, point) -> (J_ww, J_ws, J_sw, J_ss) and what else it knows
     last_resort: Callable   # (law, k, u, y, J, h) -> y and its integral after a step of any length
+    resorted: Callable      # (d, f, h) -> whether it solved its equation, f: slope at its end
     most_trials: int
     relative: float         # error estimate allowed besides, of the change of speed in a part
     bends: Callable         # (k, point, point) -> whether the motion may be nonlinear in between
@@ -141,8 +143,16 @@ def implicit_euler(law, k, u, y, J, h):
     return (w, s), (h * w, h * s)
 
 
-PAPER = Law(clutched.evaluate, clutched.jacobian, backward_euler, 200, 1e-6, lambda *_: True)
-PASSIVE = Law(passive.evaluate, passive.jacobian, implicit_euler, 400, 1e-12, passive.bends)
+def is_implicit(d, there, h):
+    """Return whether a step is h f(y_end), but for what a root leaves where f is steep."""
+    (d_w, d_s), (f_w, f_s, *_) = d, there
+    return abs(d_w - h * f_w) + abs(d_s - h * f_s) <= 1e-4 + 1e-6 * (abs(d_w) + abs(d_s))
+
+
+PAPER = Law(clutched.evaluate, clutched.jacobian, backward_euler, lambda *_: True, 200, 1e-6,
+            lambda *_: True)
+PASSIVE = Law(passive.evaluate, passive.jacobian, implicit_euler, is_implicit, 400, 1e-12,
+              passive.bends)
 
 
 def step(law, k, u, y, h, tolerance=TOLERANCE, here=None):
@@ -194,9 +204,22 @@ def step(law, k, u, y, h, tolerance=TOLERANCE, here=None):
         part *= min(GROW, max(SHRINK, scale))
         if part > 0.999 * left:
             part = left
-    (w_end, s_end), (i_w, i_s) = law.last_resort(law, k, u, (w, s), J, left)
-    there = evaluate(k, u, w_end, s_end)
-    d_w, d_s = w_end - w, s_end - s
-    parts.append(((w, s), (d_w / left, d_s / left), J, more, left, (d_w, d_s), (0.0, 0.0),
-                  (i_w, i_s), True, here, there))
-    return (w_end, s_end), (angle_w + i_w, angle_s + i_s), there, True, parts
+    part = left
+    for _ in range(MOST_RESORTS):
+        (w_end, s_end), (i_w, i_s) = law.last_resort(law, k, u, (w, s), J, part)
+        there = evaluate(k, u, w_end, s_end)
+        d_w, d_s = w_end - w, s_end - s
+        if not law.resorted((d_w, d_s), there, part):
+            part /= 2.0
+            continue
+        parts.append(((w, s), (d_w / part, d_s / part), J, more, part, (d_w, d_s), (0.0, 0.0),
+                      (i_w, i_s), True, here, there))
+        angle_w += i_w
+        angle_s += i_s
+        left -= part
+        if left <= 0.0:
+            return (w_end, s_end), (angle_w, angle_s), there, True, parts
+        w, s, here = w_end, s_end, there
+        J, more = jacobian(k, u, here)
+        part = min(2.0 * part, left)
+    raise ArithmeticError('no speed in reach fits')
