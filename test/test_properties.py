@@ -46,6 +46,10 @@ def test_a_last_resort_without_a_solution_in_one_step_takes_several():
     Tally('passive').run(62_148)
 
 
+def test_a_last_resort_finds_rest_where_it_is_nearer_than_numbers_are():
+    Tally('passive').run(78_717)
+
+
 def test_the_books_of_an_equilibrium_whose_jacobian_grows_are_finite():
     # without any torque the signs at M = 0 are arbitrary, and at those signs friction drives
     Tally('passive').run(32_317)
