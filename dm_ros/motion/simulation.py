@@ -284,6 +284,10 @@ class Simulation:
         if commands is NO_FORCE and not any(self._force):
             return self._force
         ports = self.mechanism.actuators
+        if not ports:
+            if tuple(commands) not in ((), NO_FORCE):
+                raise ValueError(f'clutch_forces: {commands!r} is not allowed, there is no clutch')
+            return ()
         A = numbers_for('clutch_forces', commands, ports)
         refuse('clutch_forces', A, ports)
         return tuple([rise_to(before, min(command, limit), rise) for before, command, (limit, rise)
