@@ -6,7 +6,7 @@ The adaptive step: for motion that is stiff or nonlinear through clutches or the
 
 A step in y = (omega_0, omega_1 - omega_2) is made of as many parts as its error asks for. A part
 is an exponential Rosenbrock step (Hochbruck and Ostermann 2010, section 2.4): with the slope f,
-its Jacobian J and Z = h J,
+its Jacobian J and Z = h J::
 
     d = h phi_1(Z) f(y)                           exact for a linear system, order 2
     D = f(y + d) - f(y) - J d                     what is not linear
@@ -15,8 +15,9 @@ its Jacobian J and Z = h J,
 phi_1 takes the stiff clutch for what it is, so a locked or a fully slipping clutch takes one
 part, whatever the torque. Where slip reverses or starts, the part shrinks until the estimate
 fits. c may vanish by chance where slip crosses the whole of tanh, so the same estimate, seen
-from the end of the part, must fit as well, unless the law knows that nothing bends. The work is bounded: after as many trials as a law
-may take the rest of the step is its last resort, one Euler step, stable but coarse.
+from the end of the part, must fit as well, unless the law knows that nothing bends. The work is
+bounded: after as many trials as a law may take the rest of the step is its last resort, one Euler
+step, stable but coarse.
 
 All works in plain floats: on 2x2 systems that is several times faster than arrays.
 """
@@ -65,7 +66,7 @@ def rosenbrock_part(law, k, u, w, s, here, J, h):
 
 
 def nonlinear_part(here, there, J, h, d_w, d_s):
-    """Return h (3 I - |h| J)^-1 (f(there) - f(here) - J d) of two points that are d apart."""
+    """Return ``h (3 I - |h| J)^-1 (f(there) - f(here) - J d)`` of two points that are d apart."""
     J_ww, J_ws, J_sw, J_ss = J
     D_w = h * (there[0] - here[0] - J_ww * d_w - J_ws * d_s)
     D_s = h * (there[1] - here[1] - J_sw * d_w - J_ss * d_s)
