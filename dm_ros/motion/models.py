@@ -6,7 +6,7 @@ One variant with one set of parameters and one step length: equations and steppe
 
 A model is immutable and holds no state, so that it can be exchanged for another between two
 steps. What it needs of a ``State`` is handed in: the speeds x, the torques T, the power flow
-and, for the friction of ``lsd_lagged``, the memory. ``step`` returns what it did, a tuple
+and, for the friction of ``lsd_lagged``, the memory. ``step`` returns what it did, a tuple::
 
     (x, flow, end, integral, point, coarse, path)
 
@@ -142,7 +142,7 @@ class SelfLockingModel:
         return direction * M_1, direction * M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
 
     def remembered(self, point):
-        """Return the |M| that the friction of the next step of ``lsd_lagged`` knows."""
+        """Return the ``|M|`` that the friction of the next step of ``lsd_lagged`` knows."""
         _, _, _, _, M_1, M_2, _, _, _, _ = point
         return abs(M_1), abs(M_2)
 
@@ -204,7 +204,7 @@ class PassiveModel:
         return M_1, M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
 
     def remembered(self, point):
-        """Return the |M| that the friction of the next step of ``lsd_lagged`` knows."""
+        """Return the ``|M|`` that the friction of the next step of ``lsd_lagged`` knows."""
         _, _, _, _, M_1, M_2, *_ = point
         return abs(M_1), abs(M_2)
 
