@@ -39,7 +39,7 @@ class NodeParameters(Parameters):
     torque_limit: float = row('torque_limit', 1e5, 'N m', 0.0, 1e9,
                               'larger demands are clamped to this and counted')
     deadband: float = row('power_flow_deadband', 0.0, 'W', 0.0, 1e9,
-                          'difference of power within which the power-flow index stays')
+                          'power (paper: difference of powers) within which the index stays')
     real_time_factor: float = row('real_time_factor', 1.0, '1', 0.0, 1e3,
                                   'speed of simulated time against the steady clock',
                                   above_low=True)

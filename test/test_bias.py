@@ -7,9 +7,10 @@ import dataclasses
 import math
 from pathlib import Path
 
-from mechanisms import BOTH, random_self_locking
+from mechanisms import BOTH, PassiveFlow, random_self_locking
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
 
 from dm_ros import SelfLockingParameters, Simulation
 from dm_ros.bias import friction_for, torque_bias
@@ -77,6 +78,28 @@ def test_the_limits_know_forces_and_coast_factors(direction):
 @pytest.mark.parametrize('direction', BOTH)
 def test_the_shafts_stay_together_within_the_limits_and_part_beyond_them(direction):
     try_the_limits(direction, mechanisms())
+
+
+@pytest.mark.parametrize('torque, off', [(10.0, 0.4), (29.0, 0.05), (31.0, 1e-6), (300.0, 1e-6)])
+def test_below_30_n_m_the_preload_turns_both_gear_moments_round_and_the_formula_is_off_a_little(
+        torque, off):
+    p = without_drag(SelfLockingParameters())
+    for direction in BOTH:
+        worst, turned = 0.0, 0
+        for split, sign in zip(torque_bias(p, torque, direction), (-1, 1), strict=True):
+
+            def point(outputs, sign=sign, direction=direction):
+                flow = PassiveFlow(p, (direction * torque, *(-direction * outputs)))
+                return flow.point(2000.0, 800.0 * sign)
+
+            # linear but for the signs: two outputs that leave carrier and slip as they are
+            steady = fsolve(lambda outputs, point=point: point(outputs)[:2], split, xtol=1e-12)
+            worst = max(worst, np.abs(steady - split).max())
+            M_1, M_2 = point(steady)[4:6]
+            assert M_1 * M_2 > 0.0
+            turned += M_1 * direction < 0.0
+        assert worst < off
+        assert turned == (torque < 30.0)
 
 
 def try_the_limits(direction, mechanisms):

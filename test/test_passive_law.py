@@ -408,26 +408,6 @@ def test_a_governed_cruise_needs_more_than_it_gives():
     assert out_over_in == pytest.approx(0.954, abs=1e-3) and out_over_in < rated_efficiency(p)
 
 
-@pytest.mark.parametrize('kind', ['ramp', 'ripple', 'power', 'held'])
-@pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])
-def test_the_index_of_balanced_loads_does_not_chatter(variant, kind):
-    both = {'ramp': lambda n, w: -99 - n / 5000,
-            'ripple': lambda n, w: -99 - n / 5000 + 0.1 * np.sin(2 * n),
-            'power': lambda n, w: -1e4 / w,
-            'held': lambda n, w: -100}[kind]
-    ratio, even, uneven = (3.517, 0.5, 0.51) if variant == 'symmetric_ode' else (1, 0.4, 0.62)
-    share, start = (uneven, 20.0) if kind == 'held' else (even, 100.0)
-    simulation = Simulation(variant, initial_velocity=(start, start))
-    snapshot, index = simulation.snapshot(), []
-    for n in range(10_000):
-        load = both(n, snapshot.velocity[0])
-        snapshot = simulation.step((100 / ratio, share * load, (1 - share) * load))
-        index.append(snapshot.power_flow)
-        if kind == 'power' and snapshot.velocity[0] < 1.0:
-            break   # stalled: a load of 10 kW at rest drives
-    assert np.count_nonzero(np.diff(index)) == 0
-
-
 def test_both_mechanisms_agree_where_they_are_the_same():
     # without final drive and clutches, with equal crown gears: the carrier as the input
     p = SymmetricParameters()

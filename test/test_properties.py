@@ -179,6 +179,21 @@ def compare_with_the_page(wanted):
             assert got[key][1:] == pytest.approx(others, rel=0.02, abs=1.0), key
 
 
+@pytest.mark.parametrize('load', ['ramp', 'ripple', 'power', 'held'])
+@pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])
+def test_under_the_passive_law_the_index_stays_until_the_load_stalls_the_mechanism(variant, load):
+    names, _ = names_of_the_page()
+    names['Simulation'] = lambda *args, **kwargs: Simulation(
+        *args, **{**kwargs, 'loss_law': 'passive'})
+    # without a dead band; with one it takes more power to switch
+    run = names['balanced'](variant, load, 0)
+    carrier = np.array([snapshot.velocity[0] for snapshot in run])
+    stalled = np.flatnonzero(carrier < 1.0)[0]   # torques within the losses bring it to rest
+    index = [snapshot.power_flow for snapshot in run]
+    assert set(index[:stalled] if load == 'power' else index) == {1}
+    assert load == 'power' or np.abs(carrier[-1]) < 0.02   # a creep
+
+
 def test_the_page_on_the_power_flow_index_prints_what_it_says():
     # of each load and variant one dead band, another each time
     compare_with_the_page([4 * n + n % 4 for n in range(8)])

@@ -133,12 +133,28 @@ def test_the_index_of_the_pages_has_every_page():
     assert sorted(re.findall(r'^   /doc/(.*)$', index, re.MULTILINE)) == sorted(DOC)
 
 
-def test_every_test_that_the_physics_page_names_is_there():
-    names = re.findall(r'`(test_\w+)`', DOC['physics'])
-    tests = ''.join(path.read_text() for path in (ROOT / 'test').glob('test_*.py'))
+@pytest.mark.parametrize('page', ['physics', 'faults'])
+def test_every_test_that_a_page_names_is_there(page):
+    names = re.findall(r'`(test_\w+)`', DOC[page])
+    tests = ''.join(path.read_text() for path in (ROOT / 'test').rglob('test_*.py'))
     assert len(names) > 5
     for name in names:
         assert f'def {name}' in tests, name
+
+
+def test_the_page_on_faults_counts_the_random_sequences_as_they_are():
+    told = re.findall(r'takes ([\d,]+)\s(?:sequences of the `Plant`\s)?and ([\d,]+)',
+                      DOC['faults'])
+    for path, numbers in zip(('test_fuzz.py', 'long/test_fuzz_long.py'), told, strict=True):
+        run = re.findall(r'run\(\w+Machine, ([\d_]+)\)', (ROOT / 'test' / path).read_text())
+        assert [int(number) for number in run] == [int(n.replace(',', '')) for n in numbers]
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: f'{page.parent.name}-{page.stem}')
+def test_every_path_that_is_named_is_there(page):
+    text = page.read_text()
+    for path in re.findall(r'`((?:dm_ros|doc|test|config|examples|bench)/[\w./]*)`', text):
+        assert (ROOT / path).exists(), path
 
 
 def test_every_make_target_that_is_named_is_there():

@@ -6,8 +6,9 @@ Torque bias: how far the clutches of a self-locking differential shift torque, i
 
 At full slip tanh is 1, and (59), (60), without acceleration and viscous drag, are linear. With
 sigma_k = +1 where shaft k outruns the carrier and -1 where it lags, x_k = tan(alpha) f_k and the
-preload friction S_k = n_s N_k R_k f_k, the clutch moment is F_k = sigma_k (x_k |M_k| + S_k), and
+preload friction S_k = n_s N_k R_k f_k::
 
+    clutch:   F_k = sigma_k (x_k |M_k| + S_k)
     direct:   M_2 = g_12 M_1,   eta_0B T_0 = sum(M_k - F_k),   -T_k = eta_kG M_k - F_k
     reverse:  eta_2G M_2 = g_12 eta_1G M_1,   -T_0 = sum(eta_0B eta_kG M_k + F_k),
               T_k = M_k + F_k

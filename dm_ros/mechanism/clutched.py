@@ -4,7 +4,7 @@
 """
 The motion of a self-locking differential, clutches and all, as functions of plain floats.
 
-In y = (w, s), the carrier speed omega_0 and the slip omega_1 - omega_2, under held torques T:
+In y = (w, s), the carrier speed omega_0 and the slip omega_1 - omega_2, under held torques T::
 
     dy/dt = A y + B T - C F
     M     = P y + Q T - W F
@@ -16,7 +16,7 @@ direction and M differ in sign.
 
 ``Coefficients`` has the matrices as numbers for one direction of power flow, ``held`` turns the
 inputs of a step into what of them is constant, and the rest follows from both and the state. A
-``point`` is all that is known of one state, a tuple in this order:
+``point`` is all that is known of one state, a tuple in this order::
 
     (dw/dt, ds/dt, F_1, F_2, M_1, M_2, t_1, t_2, x_1, x_2)
 
@@ -180,7 +180,7 @@ def jacobian(k, u, point):
 
 def solve_moments(z, W, x, coasting=None):
     """
-    Solve M = z - W diag(x) |M| for the gear moments.
+    Solve ``M = z - W diag(x) |M|`` for the gear moments.
 
     For each of the four sign patterns of M the system is linear; for admissible parameters
     exactly one pattern agrees with its own solution, and it is found by looking, not by

@@ -8,12 +8,12 @@ The paper puts all efficiencies on one index of power flow; where the power thro
 runs against the index, its loss becomes a gain. Here a loss depends on the local power alone, so
 no element ever gives energy back, and where all local powers run one way these are the paper's
 equations of that direction. M is positive when the mechanism drives the shaft (M_F when the
-pinion drives the carrier), in all flows. With sigma = tanh(omega/mesh_sign_speed) a mesh gives
+pinion drives the carrier), in all flows. With sigma = tanh(omega/mesh_sign_speed) a mesh gives::
 
     within   N = (1 + eta)/2 M + (1 - eta)/2 |M| sigma     at the satellites, at the pinion
     without  S = (1 + eta)/2 M - (1 - eta)/2 |M| sigma     at the shaft, at the carrier (C)
 
-so that N - S is (1 - eta) |M| with a sign that always brakes, and with [v]+ = max(v, 0)
+so that N - S is ``(1 - eta) |M|`` with a sign that always brakes, and with [v]+ = max(v, 0)::
 
     I_k e_k = S_k - L_k - F_k + T_k                                            k = 1, 2
     I_0 e_0 = C - (N_1 + N_2) - X - D_0,     X = L_0 - L_1 - L_2 - F_1 - F_2
@@ -25,7 +25,7 @@ so that N - S is (1 - eta) |M| with a sign that always brakes, and with [v]+ = m
 with the friction of the clutches F_k as in ``clutched``. The motion is in y = (w, s), the carrier
 speed omega_0 and the slip omega_1 - omega_2. The accelerations e_0 and ds/dt solve two equations
 that are linear while the signs of the moments are known, and exactly one set of signs agrees with
-its own solution. A ``point`` is all that is known of one state, a tuple in this order:
+its own solution. A ``point`` is all that is known of one state, a tuple in this order::
 
     (dw/dt, ds/dt, F_1, F_2, M_1, M_2, M_F, signs, state, solved)
 

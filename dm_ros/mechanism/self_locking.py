@@ -6,11 +6,10 @@ The equations of the asymmetric self-locking differential (section 4 of the pape
 
 Three formulations of one mechanism, each for direct and reverse power flow:
 
-``SelfLockingLagged``  variant 1: moments eliminated, 2x2, the friction from the |M| of the
-                       preceding step, (61)-(70)
-``SelfLockingOde``     variant 2: (e_1, e_2, M_1, M_2) at once, 4x4, (71)-(77)
-``SelfLockingDae``     variant 3: (e_0, e_1, e_2, e_s, M_1, M_2) with constraints, 6x6,
-                       (78)-(88)
+- ``SelfLockingLagged``, variant 1: moments eliminated, 2x2, the friction from the ``|M|`` of the
+  preceding step, (61)-(70)
+- ``SelfLockingOde``, variant 2: (e_1, e_2, M_1, M_2) at once, 4x4, (71)-(77)
+- ``SelfLockingDae``, variant 3: (e_0, e_1, e_2, e_s, M_1, M_2) with constraints, 6x6, (78)-(88)
 
 Symbols and signs are those of the paper, the order of the elements is (0, 1, 2, s): carrier,
 front, rear, satellite. ``T`` holds the torques on the ports, in their order; a torque is positive
@@ -19,7 +18,7 @@ stands here, marked "erratum", and a test shows that the printed one fails.
 
 The clutch friction depends on the speeds through the slip omega_1 - omega_2 alone, so the
 motion is written in the carrier speed and the slip, y = (omega_0, omega_1 - omega_2). Under
-held torques each formulation is linear but for the clutch moments F = (F_1, F_2):
+held torques each formulation is linear but for the clutch moments F = (F_1, F_2)::
 
     dy/dt = A y + B T - C F
     M     = P y + Q T - W F        M = (M_1, M_2), in the sign of the paper
@@ -126,7 +125,7 @@ def viscous(p):
 
 class SelfLockingLagged:
     """
-    Variant 1: two equations in omega_1, omega_2; |M| in the friction is that of the last step.
+    Variant 1: two equations in omega_1, omega_2; ``|M|`` in the friction is that of the last step.
 
     The system is linear in the accelerations; M is recovered from them, (68), (70).
     """

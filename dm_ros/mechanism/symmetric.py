@@ -6,8 +6,8 @@ The equations of the symmetric differential with final drive (section 3 of the p
 
 Two formulations of one mechanism, each for direct and reverse power flow:
 
-``SymmetricOde``  variant 1: the internal moments eliminated, 2x2, (18)-(34), (38)-(39)
-``SymmetricDae``  variant 2: all elements and their constraints, 8x8, (40)-(52)
+- ``SymmetricOde``, variant 1: the internal moments eliminated, 2x2, (18)-(34), (38)-(39)
+- ``SymmetricDae``, variant 2: all elements and their constraints, 8x8, (40)-(52)
 
 Symbols and signs are those of the paper, the order of the elements is (0, 1, 2, 3, s):
 carrier, left, right, pinion, satellite. ``T`` holds the torques on the ports, in their order; a
@@ -15,7 +15,7 @@ torque is positive when it accelerates its shaft. Where a printed equation contr
 the corrected form stands here, marked "erratum", and a test shows that the printed one fails.
 
 Under held torques both are linear. Each gives, for one flow of power (direct, reverse, or
-what stands for the efficiencies of direct flow under the passive law, see ``efficiencies``),
+what stands for the efficiencies of direct flow under the passive law, see ``efficiencies``)::
 
     e_D = A omega_D + B T        omega_D = (omega_1, omega_2), e_D = d omega_D/dt
     M   = P omega_D + Q T        M = (M_F, M_1, M_2), in the sign of the paper

@@ -6,7 +6,7 @@ The adaptive step: for motion that is stiff or nonlinear through clutches or the
 
 A step in y = (omega_0, omega_1 - omega_2) is made of as many parts as its error asks for. A part
 is an exponential Rosenbrock step (Hochbruck and Ostermann 2010, section 2.4): with the slope f,
-its Jacobian J and Z = h J,
+its Jacobian J and Z = h J::
 
     d = h phi_1(Z) f(y)                           exact for a linear system, order 2
     D = f(y + d) - f(y) - J d                     what is not linear
@@ -67,7 +67,7 @@ def rosenbrock_part(law, k, u, w, s, here, J, h):
 
 
 def nonlinear_part(here, there, J, h, d_w, d_s):
-    """Return h (3 I - |h| J)^-1 (f(there) - f(here) - J d) of two points that are d apart."""
+    """Return ``h (3 I - |h| J)^-1 (f(there) - f(here) - J d)`` of two points that are d apart."""
     J_ww, J_ws, J_sw, J_ss = J
     D_w = h * (there[0] - here[0] - J_ww * d_w - J_ws * d_s)
     D_s = h * (there[1] - here[1] - J_sw * d_w - J_ss * d_s)

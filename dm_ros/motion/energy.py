@@ -5,20 +5,19 @@
 The energy books of a differential: what the torques put in, what is stored, what is lost where.
 
 ``AuditedSimulation`` is a ``Simulation`` that keeps the books of each tick and their total, see
-``Energy``; it moves bit for bit like one without them. Under held torques, with the symbols and
-the signs of the paper (L, M, F as in ``symmetric`` and ``self_locking``), a tick obeys
+``Energy``; it moves bit for bit like one without them. Under held torques a tick obeys::
 
     work = stored + viscous + gears + bearings + clutches + numerical
 
 Every term is computed on its own, none is the remainder of the others:
 
-work       the held torques times the angles that the simulation reports
-stored     the difference of the kinetic energies at the ends
-losses     of the symmetric differential in closed form: its motion is an exponential, and its
-           powers are quadratic in speeds and torques, so their integrals are quadratic too;
-           of the self-locking one by quadrature along the path of its step
-numerical  zero for the symmetric one. The path of the clutch's step obeys the equations but for
-           its error; this is the work of that error, positive when it takes energy away
+- work: the held torques times the angles that the simulation reports
+- stored: the difference of the kinetic energies at the ends
+- losses: of an exact step in closed form: its motion is an exponential, and its powers are
+  quadratic in speeds and torques, so their integrals are quadratic too; of an adaptive one by
+  quadrature along its path
+- numerical: zero for an exact step. The path of an adaptive one obeys the equations but for its
+  error; this is the work of that error, positive when it takes energy away
 """
 
 from operator import add

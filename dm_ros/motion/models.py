@@ -8,7 +8,7 @@ A model is immutable and holds no state, so that it can be exchanged for another
 steps. What it needs of a ``State`` is handed in: the speeds x, the torques T, the power flow
 and S, the friction of the clutches at full slip that does not follow the moments of the step,
 which ``friction`` makes of axial forces and, for ``lsd_lagged``, the memory. ``step`` returns
-what it did, a tuple
+what it did, a tuple::
 
     (x, flow, end, integral, point, coarse, path)
 
@@ -148,7 +148,7 @@ class SelfLockingModel:
         return direction * M_1, direction * M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
 
     def remembered(self, point, direction):
-        """Return the |M| that the friction of the next step of ``lsd_lagged`` knows."""
+        """Return the ``|M|`` that the friction of the next step of ``lsd_lagged`` knows."""
         _, _, _, _, M_1, M_2, _, _, _, _ = point
         return clutched.pressing(self.parameters, direction * M_1, direction * M_2)
 
@@ -211,7 +211,7 @@ class PassiveModel:
         return M_1, M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
 
     def remembered(self, point, flow):
-        """Return the |M| that the friction of the next step of ``lsd_lagged`` knows."""
+        """Return the ``|M|`` that the friction of the next step of ``lsd_lagged`` knows."""
         _, _, _, _, M_1, M_2, *_ = point
         return clutched.pressing(self.parameters, M_1, M_2)
 

@@ -40,7 +40,7 @@ here, and the paper's figures 3, 4, 7 and 8 drawn from these runs, all under the
 A second page has both loss laws side by side: where the energy goes on the same load, on a drive
 cycle and on balanced loads. DIR gets index.html and laws.html, which hold all pictures and can be
 passed on alone, and each picture as PNG beside them. All numbers but the timings are the same in
-each run. It takes about a minute.
+each run. It takes one to two minutes.
 
 IN.csv is that of "simulate": a header "time,<shaft>,..." with the input shafts (symmetric: pinion,
 left, right; lsd: carrier, front, rear), rows of s and N m that hold until the next row's time; the
