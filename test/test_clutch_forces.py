@@ -166,18 +166,12 @@ def test_the_moments_have_one_solution_with_any_coast_factor(loss_law):
 def test_a_force_rises_with_the_time_constant_of_its_actuator():
     p = SelfLockingParameters(tau_1=0.05, tau_2=0.2)
     simulation = Simulation('lsd_ode', 1e-3, p, substeps=2)
-    for n in range(1, 301):
-        if n == 201:
-            fallen = snapshot.clutch_force
-        command = (1000.0, 500.0) if n <= 200 else (0.0, 0.0)
-        snapshot = simulation.step((0.0, 0.0, 0.0), command)
-        t, since = n * 1e-3, (n - 200) * 1e-3
-        expected = [A * (1 - math.exp(-t / tau)) if n <= 200 else F * math.exp(-since / tau)
-                    for A, F, tau in zip((1000.0, 500.0), fallen if n > 200 else (0.0, 0.0),
-                                         (0.05, 0.2))]
-        assert snapshot.clutch_force == pytest.approx(expected, rel=1e-11)
-        if n == 50:
-            assert snapshot.clutch_force[0] == pytest.approx(632.1, abs=0.1)
+    rising = [simulation.step((0.0, 0.0, 0.0), (1000.0, 500.0)).clutch_force for _ in range(200)]
+    falling = [simulation.step((0.0, 0.0, 0.0)).clutch_force for _ in range(100)]
+    t = np.arange(1, 201)[:, None] * 1e-3 / np.array([0.05, 0.2])
+    assert np.array(rising) == pytest.approx((1 - np.exp(-t)) * [1000.0, 500.0], rel=1e-11)
+    assert np.array(falling) == pytest.approx(np.exp(-t[:100]) * rising[-1], rel=1e-11)
+    assert rising[49][0] == pytest.approx(632.1, abs=0.1)   # one time constant
 
 
 def test_a_force_beyond_the_limit_is_that_of_the_limit():

@@ -14,8 +14,8 @@ preload friction S_k = n_s N_k R_k f_k::
               T_k = M_k + F_k
 
 An actuator's force A_k adds f_k R_k A_k to S_k; in reverse flow, where the shafts drive, x_k is
-scaled by the coast factor. With both values of sigma this gives the limits of the split; all splits between them are held
-by friction, with the shafts locked.
+scaled by the coast factor. With both values of sigma this gives the limits of the split; all
+splits between them are held by friction, with the shafts locked.
 """
 
 import math
