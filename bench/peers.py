@@ -52,8 +52,9 @@ class Clutches:
     """The equations of a self-locking differential, as this package has them."""
 
     def __init__(self, p):
-        self._coefficients = {d: clutched.coefficients(p, SelfLockingOde(p).response(d))
-                              for d in (DIRECT, REVERSE)}
+        self._coefficients = {
+            d: clutched.coefficients(p, SelfLockingOde(p).response(d), direction=d)
+            for d in (DIRECT, REVERSE)}
         self._preload = clutched.full_friction(p)[1]
 
     def under(self, T, direction=DIRECT):

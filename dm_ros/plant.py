@@ -14,7 +14,7 @@ from typing import NamedTuple
 from dm_ros.motion.energy import AuditedSimulation, given_back
 from dm_ros.motion.held_inputs import HeldInputs
 from dm_ros.motion.models import PAPER
-from dm_ros.motion.simulation import Simulation
+from dm_ros.motion.simulation import NO_FORCE, Simulation
 from dm_ros.settings import make_simulation, NodeParameters
 
 
@@ -70,11 +70,13 @@ class Plant:
         self.simulation = make_simulation(
             settings.variant, values,
             kind=AuditedSimulation if settings.energy_audit else Simulation)
-        self.inputs = HeldInputs(self.simulation.mechanism.ports, settings.torque_limit, 0.0)
+        mechanism = self.simulation.mechanism
+        self.inputs = HeldInputs(mechanism.ports + mechanism.actuators, (), 0.0)
+        self._shafts = len(mechanism.ports)
         self.ticks = 0   # in all, also refused ones and those before a reset
-        self.refusing = Condition('torque messages are refused', log)
-        self.clamping = Condition('torques are clamped', log)
-        self.stale = Condition('torques are too old and count as zero', log)
+        self.refusing = Condition('messages are refused', log)
+        self.clamping = Condition('demands are clamped', log)
+        self.stale = Condition('demands are too old and count as zero', log)
         self.out_of_range = Condition('ticks are refused', log)
         self.coarse = Condition('solver steps are coarse', log)
         self.motoring = Condition('gears and bearings give energy back, as motors', log)
@@ -91,20 +93,25 @@ class Plant:
         """``{full name: value}`` of all parameters, its own and those of its mechanism."""
         return {**self.settings.named(), **self.simulation.parameters.named()}
 
-    def take(self, names, values, what, stamp=0):
+    def take(self, names, values, what, stamp=0, sparse=False):
         """
         Take a demand for some ports, whole or not at all; return whether it was taken.
 
+        The ports are the shafts that take a torque, N m, and the clutches that take an axial
+        force, N, by the names of their moments.
+
         :param what: what brought it, in words.
         :param stamp: ns, in which demands must follow one another; 0 for none.
+        :param sparse: whether NaN stands for no demand, else it is refused.
         """
         if stamp and stamp <= self._last_stamp:
             self.inputs.refused += 1
             self.refusing.happened(f'{what}: its stamp repeats or goes back in time')
             return False
         try:
-            if self.inputs.demand(names, values, self.simulation.ticks):
-                self.clamping.happened(f'{what}: beyond {self.inputs.limit:g} N m')
+            if clamped := self.inputs.demand(names, values, self.simulation.ticks, sparse):
+                limits = dict.fromkeys(f'{limit:g} {port.unit}' for port, limit in clamped)
+                self.clamping.happened(f'{what}: beyond {", ".join(limits)}')
         except ValueError as error:
             self.refusing.happened(f'{what}: {error}')
             return False
@@ -117,8 +124,10 @@ class Plant:
 
         A tick that would lead out of the range of numbers is refused and counted: the state stays.
         """
+        held, shafts = self.inputs.in_force(self.simulation.ticks), self._shafts
+        forces = held[shafts:]
         try:
-            self.simulation.advance(self.inputs.in_force(self.simulation.ticks))
+            self.simulation.advance(held[:shafts], forces if any(forces) else NO_FORCE)
         except ValueError as error:
             self.out_of_range.happened(str(error))
         self.ticks += 1
@@ -163,7 +172,10 @@ class Plant:
             simulation.adopt(prepared.model)
         simulation.power_flow_deadband = settings.deadband
         simulation.initial_velocity = settings.initial_velocity(simulation.outputs)
-        self.inputs.limit = settings.torque_limit
+        values, mechanism = simulation.parameters.named(), simulation.mechanism
+        self.inputs.limits = (settings.torque_limit,) * self._shafts + tuple(
+            values[f'{mechanism.name}.clutch.{clutch}.actuator_limit']
+            for clutch in simulation.clutches)
         # in lockstep time stands still without torques, so none is too old
         self.inputs.timeout = 0.0 if self.lockstep else settings.torque_timeout * settings.rate
 

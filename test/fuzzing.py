@@ -49,19 +49,28 @@ finite = st.floats(-1e6, 1e6) | st.sampled_from([0.0, -0.0, 30.0, -200.0, 1e5, -
 anything = finite | st.floats() | st.sampled_from([math.nan, math.inf, -math.inf, 1e308, -1e308])
 
 
-def demands(shafts):
-    """Return demands as (names, torques): good ones, and such that must be refused."""
-    good = st.dictionaries(st.sampled_from(shafts), finite).map(
-        lambda demand: (list(demand), list(demand.values())))
-    names = st.lists(st.sampled_from([*shafts, 'wheel', '', 'satellite']), max_size=5)
+def demands(mechanism):
+    """Return demands as (names, values): good ones, and such that must be refused."""
+    forces = [port.name for port in mechanism.actuators]
+    pair = st.tuples(st.sampled_from(mechanism.inputs), finite | st.just(math.nan))
+    if forces:
+        pair |= st.tuples(st.sampled_from(forces), finite.map(abs) | st.just(math.nan))
+    good = st.lists(pair, max_size=5, unique_by=lambda named: named[0]).map(
+        lambda pairs: ([name for name, _ in pairs], [value for _, value in pairs]))
+    names = st.lists(st.sampled_from(
+        [*mechanism.inputs, *forces, 'wheel', '', 'satellite', 'left_clutch']), max_size=5)
     bad = st.tuples(names, st.lists(anything, max_size=5))
     return good | good | bad
 
 
-def as_demanded(shafts, names, torques):
-    """Return whether a demand is to be taken."""
-    return (len(names) == len(torques) == len(set(names)) and set(names) <= set(shafts)
-            and all(map(math.isfinite, torques)))
+def as_demanded(mechanism, names, values, sparse=True):
+    """Return whether a demand is to be taken; sparse: whether NaN is no demand."""
+    forces = {port.name for port in mechanism.actuators}
+    return (len(names) == len(values) == len(set(names))
+            and set(names) <= forces | set(mechanism.inputs)
+            and all(sparse if math.isnan(value) else
+                    math.isfinite(value) and not (name in forces and value < 0.0)
+                    for name, value in zip(names, values)))
 
 
 def stamp_of(which, last):
@@ -98,7 +107,7 @@ def changes(table, wanted=lambda name: True):
     return st.lists(pair, min_size=1, max_size=3).map(dict)
 
 
-DEMANDS = {m.inputs: demands(m.inputs) for m in MECHANISMS.values()}
+DEMANDS = {m.name: demands(m) for m in MECHANISMS.values()}
 TABLES = {m.parameters: changes(m.parameters) for m in MECHANISMS.values()}
 OWN = ('torque_limit', 'torque_timeout', 'power_flow_deadband', 'substeps')
 own_changes = changes(
@@ -158,25 +167,27 @@ class CoreMachine(RuleBasedStateMachine):
         self.simulation, self.inputs = self.plant.simulation, self.plant.inputs
         self.laws = Laws(variant)
         self.last_stamp = self.ticks = 0
-        self.demand = {}   # what it should be: {shaft: (torque, tick)}
+        self.demand = {}   # what it should be: {name: (value, tick)}
 
     def count(self, what):
         self.done[what] = self.done.get(what, 0) + 1
 
     def in_force(self):
         """Return all that a refused request must not touch."""
-        return (self.plant.values, self.inputs.limit, self.inputs.timeout,
+        return (self.plant.values, self.inputs.limits, self.inputs.timeout,
                 self.inputs.in_force(self.ticks), repr(self.simulation.snapshot()))
 
-    @rule(data=st.data(), stamp=st.sampled_from(STAMPS))
-    def demands(self, data, stamp):
-        shafts, limit = self.simulation.inputs, self.inputs.limit
-        names, torques = data.draw(DEMANDS[shafts])
+    @rule(data=st.data(), stamp=st.sampled_from(STAMPS), sparse=st.booleans())
+    def demands(self, data, stamp, sparse):
+        mechanism = self.simulation.mechanism
+        limits = dict(zip(self.inputs.names, self.inputs.limits))
+        names, values = data.draw(DEMANDS[mechanism.name])
         stamp = stamp_of(stamp, self.last_stamp)
-        good = as_demanded(shafts, names, torques) and (stamp == 0 or stamp > self.last_stamp)
+        good = as_demanded(mechanism, names, values, sparse) and (
+            stamp == 0 or stamp > self.last_stamp)
         before, counts = self.in_force(), (self.inputs.received, self.inputs.refused)
         refused, clamped = self.plant.refusing.count, self.plant.clamping.count
-        assert self.plant.take(names, torques, 'a demand', stamp) == good
+        assert self.plant.take(names, values, 'a demand', stamp, sparse) == good
         assert (self.inputs.received - counts[0], self.inputs.refused - counts[1]) == (
             (1, 0) if good else (0, 1))
         assert self.plant.refusing.count - refused == (not good)
@@ -184,22 +195,25 @@ class CoreMachine(RuleBasedStateMachine):
             self.count('refused demands')
             assert repr(self.in_force()) == repr(before)
             return
-        assert self.plant.clamping.count - clamped == any(abs(T) > limit for T in torques)
+        assert self.plant.clamping.count - clamped == any(
+            abs(value) > limits[name] for name, value in zip(names, values))
         self.count('demands')
         self.last_stamp = stamp or self.last_stamp
-        for name, torque in zip(names, torques):
-            self.demand[name] = max(-limit, min(limit, torque)), self.ticks
+        for name, value in zip(names, values):
+            if not math.isnan(value):
+                limit = limits[name]
+                self.demand[name] = max(-limit, min(limit, value)), self.ticks
 
     @precondition(lambda self: not self.paused)
     @rule(ticks=st.integers(1, 8))
     def ticks_pass(self, ticks):
         for _ in range(ticks):
-            torques = self.inputs.in_force(self.ticks)
+            held = self.inputs.in_force(self.ticks)
             timeout = self.inputs.timeout
-            assert torques == tuple(
-                0.0 if shaft not in self.demand or timeout
-                and self.demand[shaft][1] < self.ticks - timeout else self.demand[shaft][0]
-                for shaft in self.simulation.inputs)
+            assert held == tuple(
+                0.0 if name not in self.demand or timeout
+                and self.demand[name][1] < self.ticks - timeout else self.demand[name][0]
+                for name in self.inputs.names)
             before, refused = self.simulation.snapshot(), self.plant.out_of_range.count
             snapshot = self.plant.tick()
             if self.plant.out_of_range.count > refused:
@@ -208,7 +222,12 @@ class CoreMachine(RuleBasedStateMachine):
                 continue
             self.ticks += 1
             self.count('ticks')
-            assert snapshot.torque == torques
+            shafts = len(snapshot.torque)
+            assert snapshot.torque == held[:shafts]
+            for before_, force, command in zip(
+                    before.clutch_force, snapshot.clutch_force, held[shafts:], strict=True):
+                # an actuator moves towards its command, or its limit
+                assert 0.0 <= force <= max(before_, command) * (1 + 1e-15)
             self.laws_hold()
 
     @rule(data=st.data(), substeps=st.none() | st.sampled_from([0, 1, 2, 5, 2.5]))
@@ -241,7 +260,9 @@ class CoreMachine(RuleBasedStateMachine):
                                    atol=1e-12 * max(map(abs, snapshot.velocity[1:3]))
                                    + SUBNORMAL)
         # a demand that was clamped to an older limit stays what it is
-        assert self.inputs.limit == self.plant.settings.torque_limit
+        shafts = len(snapshot.torque)
+        assert self.inputs.limits[:shafts] == (self.plant.settings.torque_limit,) * shafts
+        assert after.clutch_force == snapshot.clutch_force
 
     @rule()
     def pause(self):
@@ -262,7 +283,7 @@ class CoreMachine(RuleBasedStateMachine):
         self.count('resets')
         snapshot = self.simulation.snapshot()
         assert (snapshot.time, snapshot.power_flow) == (0.0, 1)
-        assert not any((*snapshot.position, *snapshot.torque))
+        assert not any((*snapshot.position, *snapshot.torque, *snapshot.clutch_force))
 
     @invariant()
     def laws_hold(self):
@@ -291,6 +312,7 @@ class NodeMachine(RuleBasedStateMachine):
     @initialize(variant=st.sampled_from(VARIANTS))
     def begin(self, variant):
         self.node, self.heard, self.defaults = self.nodes[variant]
+        self.messages = 4 if self.node.simulation.clutches else 3   # of a tick
         self.node.control.running.set()
         self.heard.clear()   # a sequence may be broken off
         self.laws = Laws(variant)
@@ -313,7 +335,7 @@ class NodeMachine(RuleBasedStateMachine):
         """Return all that a refused request must not touch."""
         simulation, inputs = self.node.simulation, self.node.plant.inputs
         return (simulation.parameters, simulation.substeps, simulation.power_flow_deadband,
-                simulation.initial_velocity, inputs.limit, repr(simulation.snapshot()),
+                simulation.initial_velocity, inputs.limits, repr(simulation.snapshot()),
                 {name: self.node.get_parameter(name).value for name in self.defaults})
 
     @precondition(lambda self: self.node.control.running.is_set())
@@ -322,13 +344,13 @@ class NodeMachine(RuleBasedStateMachine):
     def torques(self, data, stamp, times):
         from builtin_interfaces.msg import Time
         from sensor_msgs.msg import JointState
-        shafts = self.node.simulation.inputs
-        names, torques = data.draw(DEMANDS[shafts])
+        mechanism = self.node.simulation.mechanism
+        names, values = data.draw(DEMANDS[mechanism.name])
         for _ in range(times):
             stamp_now = stamp_of(stamp, self.last_stamp)
-            message = JointState(name=names, effort=torques)
+            message = JointState(name=names, effort=values)
             message.header.stamp = Time(sec=stamp_now // 10**9, nanosec=stamp_now % 10**9)
-            good = as_demanded(shafts, names, torques) and (
+            good = as_demanded(mechanism, names, values) and (
                 stamp_now == 0 or stamp_now > self.last_stamp)
             inputs = self.node.plant.inputs
             before = inputs.received, inputs.refused, self.in_force()[-2]
@@ -349,7 +371,7 @@ class NodeMachine(RuleBasedStateMachine):
         assert refused in (0, 1)
         self.ticks += not refused
         self.count('refused ticks' if refused else 'ticks')
-        assert len(self.heard) == 3
+        assert len(self.heard) == self.messages
         self.laws_hold()
 
     @rule(data=st.data())
@@ -414,9 +436,13 @@ class NodeMachine(RuleBasedStateMachine):
         simulation = self.node.simulation
         assert simulation.ticks == self.ticks
         assert simulation.time == self.ticks * simulation.dt
-        assert len(self.heard) % 3 == 0
+        assert len(self.heard) % self.messages == 0
         while self.heard:
-            joints, moments, flow = [self.heard.pop(0) for _ in range(3)]
+            joints, moments, *clutches, flow = [self.heard.pop(0) for _ in range(self.messages)]
+            for message in clutches:
+                assert message.header.stamp == joints.header.stamp
+                assert all(map(math.isfinite, (*message.position, *message.velocity)))
+                assert all(0.0 <= force < math.inf for force in message.effort)
             assert joints.header.stamp == moments.header.stamp
             stamp = joints.header.stamp.sec * 10**9 + joints.header.stamp.nanosec
             assert stamp == round(simulation.ticks * simulation.dt * 1e9)
@@ -458,7 +484,8 @@ def nodes():
             stack.callback(node.close)
             node.get_logger().set_level(LoggingSeverity.FATAL)   # it has much to complain about
             messages = []
-            for publisher in ('joint_states', 'internal_moments', 'power_flow'):
+            clutches = ('clutches',) if node.simulation.clutches else ()
+            for publisher in ('joint_states', 'internal_moments', *clutches, 'power_flow'):
                 setattr(node.outputs, publisher,
                         Heard(getattr(node.outputs, publisher), messages))
             tables = (NodeParameters(), node.simulation.parameters)

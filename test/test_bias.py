@@ -32,7 +32,7 @@ def mechanisms(count=3, seed=1):
         yield p, 2.0 * preload + rng.uniform(50, 300)   # enough to turn both shafts
 
 
-def turning(p, torque, split, direction, slip, ticks, far=math.inf):
+def turning(p, torque, split, direction, slip, ticks, far=math.inf, forces=(0.0, 0.0)):
     """
     Return the slips omega_1 - omega_2 over ticks of 1 ms, and the speeds at both ends.
 
@@ -44,7 +44,7 @@ def turning(p, torque, split, direction, slip, ticks, far=math.inf):
     torques = [direction * torque, *(-direction * side for side in split)]
     slips = [slip]
     for _ in range(ticks):
-        velocity = simulation.step(torques).velocity
+        velocity = simulation.step(torques, forces).velocity
         slips.append(velocity[1] - velocity[2])
         if abs(slips[-1]) >= far:
             break
@@ -59,6 +59,20 @@ def test_the_shafts_slip_steadily_under_the_limits(direction):
             # so much slip that tanh is 1
             _, start, end = turning(p, torque, split, direction, 800.0 * sign, 100)
             assert end == pytest.approx(start, abs=1e-6)
+
+
+@pytest.mark.parametrize('direction', BOTH)
+def test_the_limits_know_forces_and_coast_factors(direction):
+    for p, torque in mechanisms():
+        p = dataclasses.replace(p, c_1=0.4, c_2=0.1)
+        forces = tuple(0.3 * torque / f / R for f, R in zip(p.f, (p.R_1, p.R_2), strict=True))
+        limits = torque_bias(p, 3 * torque, direction, forces)
+        for split, plain, sign in zip(limits, torque_bias(p, 3 * torque, direction), (-1, 1),
+                                      strict=True):
+            _, start, end = turning(p, 3 * torque, split, direction, 800.0 * sign, 100,
+                                    forces=forces)
+            assert end == pytest.approx(start, abs=1e-6)
+            assert abs(split.share.front - plain.share.front) > 0.01
 
 
 @pytest.mark.parametrize('direction', BOTH)

@@ -3,6 +3,8 @@
 
 """What advances, without ROS: demands, ticks, resets, parameters and conditions of a ``Plant``."""
 
+import math
+
 import pytest
 
 from dm_ros import Simulation, VARIANTS
@@ -48,7 +50,7 @@ def in_force(plant):
     simulation, inputs = plant.simulation, plant.inputs
     return (plant.settings, simulation.parameters, simulation.substeps, simulation.state,
             simulation.ticks, simulation.power_flow_deadband, simulation.initial_velocity,
-            inputs.in_force(simulation.ticks), inputs.limit, inputs.timeout, inputs.received)
+            inputs.in_force(simulation.ticks), inputs.limits, inputs.timeout, inputs.received)
 
 
 # Ticks
@@ -108,10 +110,10 @@ def test_in_their_order_stamps_go_up_and_a_zero_stamp_is_none(lockstep, log):
     taken = [lockstep.take(('carrier',), (float(effort),), 'test', stamp)
              for effort, stamp in enumerate((0, 100, 100, 50, -1, 0, 100, 101))]
     assert taken == [True, True, False, False, False, True, False, True]
-    assert lockstep.inputs.in_force(0) == (7.0, 0.0, 0.0)
+    assert lockstep.inputs.in_force(0) == (7.0, 0.0, 0.0, 0.0, 0.0)
     assert (lockstep.inputs.received, lockstep.inputs.refused) == (4, 4)
     assert log.lines == [
-        'WARN torque messages are refused: test: its stamp repeats or goes back in time']
+        'WARN messages are refused: test: its stamp repeats or goes back in time']
     lockstep.reset()
     assert lockstep.take(('carrier',), (1.0,), 'test', 1)
 
@@ -122,8 +124,9 @@ def test_a_stamp_of_a_refused_demand_does_not_count(lockstep):
 
 
 @pytest.mark.parametrize('names, values, why', [
-    (('front', 'wheel'), (1.0, 1.0), "'wheel' is not one of carrier, front, rear"),
-    (('front', 'front'), (1.0, 1.0), 'a shaft is named twice in front, front'),
+    (('front', 'wheel'), (1.0, 1.0), "'wheel' is not one of carrier, front, rear, "
+     'front_clutch, rear_clutch'),
+    (('front', 'front'), (1.0, 1.0), 'a name comes twice in front, front'),
     (('front', 'rear'), (1.0,), '2 names but 1 values'),
     (('front', 'rear'), (1.0, float('nan')), 'the torque on rear is nan')])
 def test_a_refused_demand_leaves_everything_as_it_was(lockstep, names, values, why):
@@ -140,7 +143,7 @@ def test_a_demand_beyond_the_limit_is_clamped_and_counted(log):
     plant = Plant({'torque_limit': 20.0}, log)
     assert plant.take(('left', 'right'), (-1e308, 5.0), 'test')
     assert plant.tick().torque == (0.0, -20.0, 5.0)
-    assert log.lines == ['WARN torques are clamped: test: beyond 20 N m']
+    assert log.lines == ['WARN demands are clamped: test: beyond 20 N m']
 
 
 def test_a_demand_grows_stale_in_real_time_and_never_in_lockstep(log):
@@ -151,7 +154,119 @@ def test_a_demand_grows_stale_in_real_time_and_never_in_lockstep(log):
             assert plant.tick().torque[1] == 7.0
         assert plant.tick().torque[1] == torque
         plant.notice()
-    assert log.lines == ['WARN torques are too old and count as zero: left']
+    assert log.lines == ['WARN demands are too old and count as zero: left']
+
+
+# Forces on the clutches
+
+
+CLUTCHES = ('front_clutch', 'rear_clutch')
+LSD_NAMES = (*NAMES['lsd'], *CLUTCHES)
+
+
+def lsd(log, **parameters):
+    """Return a ``Plant`` whose forces are limited to 900 N at the rear."""
+    return Plant({'variant': 'lsd_ode', 'rate': 100.0, 'lsd.clutch.rear.actuator_limit': 900.0,
+                  **{name.replace('__', '.'): value for name, value in parameters.items()}}, log)
+
+
+@pytest.mark.parametrize('variant', ['lsd_ode', 'lsd_dae', 'lsd_lagged'])
+@pytest.mark.parametrize('loss_law', LOSS_LAWS)
+@pytest.mark.parametrize('audited', [True, False])
+def test_with_forces_it_moves_as_the_simulation_bit_for_bit(variant, loss_law, audited, log):
+    lag = {'lsd.clutch.front.actuator_time_constant': 0.03}
+    plant = Plant({'variant': variant, 'rate': 500.0, 'loss_law': loss_law,
+                   'energy_audit': audited, **lag}, log)
+    simulation = Simulation(variant, 1 / 500.0, lag, loss_law=loss_law)
+    forces = (0.0, 0.0)
+    for n in range(300):
+        if n % 3 == 0:   # in between they are held; at times they are zero, and the lag goes on
+            forces = (float(n % 90) * 10.0, 0.0) if n % 120 < 60 else (0.0, float(n % 7))
+            assert plant.take(LSD_NAMES, (*load(n), *forces), 'test')
+        else:
+            assert plant.take(NAMES['lsd'], load(n), 'test')
+        assert tuple(plant.tick()) == tuple(simulation.step(load(n), forces))
+    assert not log.lines
+
+
+def test_a_force_beyond_the_limit_of_its_actuator_is_clamped_and_counted(log):
+    plant = lsd(log)
+    assert plant.take(('carrier', *CLUTCHES), (300.0, 900.0, 901.0), 'test')
+    assert plant.tick().clutch_force == (900.0, 900.0)
+    assert log.lines == ['WARN demands are clamped: test: beyond 900 N']
+    assert plant.inputs.clamped == plant.clamping.count == 1
+
+
+def test_the_limit_of_an_actuator_may_change_while_it_runs(log):
+    plant = lsd(log)
+    plant.take(CLUTCHES, (500.0, 500.0), 'test')
+    plant.adopt(plant.prepared({'lsd.clutch.front.actuator_limit': 50.0}))
+    assert plant.tick().clutch_force == (50.0, 500.0)   # what is held is within it, too
+    assert not log.lines
+    plant.take(('front_clutch',), (60.0,), 'test')
+    assert plant.tick().clutch_force == (50.0, 500.0)
+    assert log.lines == ['WARN demands are clamped: test: beyond 50 N']
+    plant.adopt(plant.prepared({'lsd.clutch.front.actuator_limit': 1e6}))
+    plant.take(('front_clutch',), (60.0,), 'test')
+    assert plant.tick().clutch_force == (60.0, 500.0)
+
+
+def test_a_stale_force_becomes_zero_and_the_force_follows_with_its_lag(log):
+    plant = lsd(log, torque_timeout=0.1, lsd__clutch__rear__actuator_time_constant=0.05)
+    plant.take(CLUTCHES, (200.0, 200.0), 'test')
+    forces = [plant.tick().clutch_force for _ in range(17)]
+    assert [front for front, _ in forces] == [200.0] * 11 + [0.0] * 6
+    rise = 1.0 - math.exp(-0.01 / 0.05)
+    rear = 0.0
+    for n, (_, force) in enumerate(forces):
+        rear += ((200.0 if n < 11 else 0.0) - rear) * rise
+        assert force == pytest.approx(rear, rel=1e-12)
+    plant.notice()
+    assert log.lines == ['WARN demands are too old and count as zero: front_clutch, rear_clutch']
+
+
+def test_a_force_never_grows_stale_in_lockstep(lockstep):
+    lockstep.take(CLUTCHES, (200.0, 100.0), 'test')
+    for _ in range(500):
+        assert lockstep.tick().clutch_force == (200.0, 100.0)
+
+
+@pytest.mark.parametrize('value', [-5.0, float('inf'), float('-inf')])
+def test_a_force_that_must_not_be_is_refused_by_name_and_the_torques_with_it(lockstep, value):
+    lockstep.take(LSD_NAMES, (3.0, 2.0, 1.0, 40.0, 50.0), 'test')
+    lockstep.tick()
+    before = in_force(lockstep)
+    assert not lockstep.take(('carrier', 'rear_clutch'), (7.0, value), 'a test', sparse=True)
+    assert in_force(lockstep) == before
+    assert lockstep.refusing.reason.startswith(f'a test: the force on rear_clutch is {value:g}')
+
+
+def test_nan_is_no_command_only_where_it_is_said_to_be(lockstep):
+    lockstep.take(LSD_NAMES, (3.0, 2.0, 1.0, 40.0, 50.0), 'test')
+    nan = float('nan')
+    assert lockstep.take(('front', 'rear', *CLUTCHES), (nan, 4.0, 60.0, nan), 'test', sparse=True)
+    snapshot = lockstep.tick()
+    assert snapshot.torque == (3.0, 2.0, 4.0) and snapshot.clutch_force == (60.0, 50.0)
+    assert not lockstep.take(('front_clutch',), (nan,), 'test')
+    assert lockstep.refusing.reason == 'test: the force on front_clutch is nan'
+
+
+def test_a_reset_opens_the_clutches_at_once_whatever_their_lag(log):
+    plant = lsd(log, lsd__clutch__front__actuator_time_constant=1.0)
+    plant.take(CLUTCHES, (200.0, 100.0), 'test')
+    assert all(plant.tick().clutch_force)
+    plant.reset()
+    assert plant.simulation.snapshot().clutch_force == (0.0, 0.0)
+    assert plant.tick().clutch_force == (0.0, 0.0)
+    assert plant.inputs.silent() == list(LSD_NAMES)
+
+
+def test_a_mechanism_without_actuators_knows_no_forces(log):
+    plant = Plant({}, log)
+    assert not plant.simulation.mechanism.actuators
+    assert not plant.take(('left', 'left_clutch'), (1.0, 1.0), 'test')
+    assert plant.tick().torque == (0.0, 0.0, 0.0)
+    assert plant.refusing.reason == "test: 'left_clutch' is not one of pinion, left, right"
 
 
 # Reset
@@ -169,7 +284,8 @@ def test_after_a_reset_a_run_repeats_bit_for_bit(variant, log):
         return result
     first = run()
     plant.reset()
-    assert plant.inputs.silent() == list(names)
+    assert plant.inputs.silent() == [
+        port.name for port in plant.inputs.ports]
     assert plant.simulation.snapshot() == Plant({'variant': variant}, log).simulation.snapshot()
     assert run() == first
     assert plant.ticks == 200
@@ -211,7 +327,7 @@ def test_a_change_is_in_force_as_it_is_adopted_and_not_before(log):
     simulation, inputs = plant.simulation, plant.inputs
     assert (simulation.substeps, simulation.power_flow_deadband) == (3, 2.0)
     assert simulation.initial_velocity == (50.0, 1.0)
-    assert (inputs.limit, inputs.timeout) == (7.0, 0.1 * 200.0)
+    assert (inputs.limits[:3], inputs.timeout) == ((7.0,) * 3, 0.1 * 200.0)
     after = simulation.snapshot()
     assert after.position == snapshot.position
     assert after.velocity[1:3] == pytest.approx(snapshot.velocity[1:3], rel=1e-14)
@@ -221,7 +337,7 @@ def test_a_change_is_in_force_as_it_is_adopted_and_not_before(log):
 
 
 def test_a_condition_is_logged_once_when_it_begins_and_once_when_it_is_over(log):
-    condition = Condition('torques are clamped', log)
+    condition = Condition('demands are clamped', log)
     for _ in range(3):
         condition.happened('beyond 1 N m')
         condition.settle()
@@ -230,8 +346,8 @@ def test_a_condition_is_logged_once_when_it_begins_and_once_when_it_is_over(log)
     for _ in range(3):
         condition.settle()
     assert not condition.active
-    begin = 'WARN torques are clamped: beyond 1 N m'
-    assert log.lines == [begin, 'INFO over: torques are clamped (7 in all)']
+    begin = 'WARN demands are clamped: beyond 1 N m'
+    assert log.lines == [begin, 'INFO over: demands are clamped (7 in all)']
     condition.happened('beyond 1 N m')
     assert log.lines[2:] == [begin]
 
@@ -247,16 +363,16 @@ def test_conditions_of_a_plant_begin_and_end_once(log):
         plant.notice()
         plant.settle()
     assert log.lines == [
-        'WARN torque messages are refused: test: the torque on left is nan',
-        'WARN torques are clamped: test: beyond 100000 N m',
-        'WARN torques are too old and count as zero: left',
-        'INFO over: torque messages are refused (3 in all)',
-        'INFO over: torques are clamped (3 in all)']
+        'WARN messages are refused: test: the torque on left is nan',
+        'WARN demands are clamped: test: beyond 100000 N m',
+        'WARN demands are too old and count as zero: left',
+        'INFO over: messages are refused (3 in all)',
+        'INFO over: demands are clamped (3 in all)']
     plant.reset()
     for _ in range(2):
         plant.notice()
         plant.settle()
-    assert log.lines[5:] == ['INFO over: torques are too old and count as zero (3 in all)']
+    assert log.lines[5:] == ['INFO over: demands are too old and count as zero (3 in all)']
 
 
 # Gears and bearings that give energy back

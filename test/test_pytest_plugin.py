@@ -33,6 +33,31 @@ def test_a_direct_run_is_the_simulation_with_the_law_between_the_ticks(direct_di
     assert record.time[-1] == 0.2
 
 
+def test_a_law_may_return_torques_or_torques_and_forces(direct_differential):
+    def law(snapshot):
+        slip = abs(snapshot.velocity[1] - snapshot.velocity[2])
+        return TORQUES if snapshot.time < 0.05 else (TORQUES, (100.0 * slip, 50.0))
+
+    vehicle, simulation = direct_differential('lsd_ode'), Simulation('lsd_ode', 1e-3)
+    record, snapshot = vehicle.run(law, seconds=0.1), simulation.snapshot()
+    for n in range(100):
+        demand = law(snapshot)
+        snapshot = simulation.step(*demand) if len(demand) == 2 else simulation.step(demand)
+        assert record.velocity['rear'][n] == snapshot.velocity[2]
+        assert record.clutch_force['front'][n] == snapshot.clutch_force[0]
+    assert set(record.clutch_force['rear']) == {0.0, 50.0}
+    assert record.clutch_force['front'][-1] > 0.0
+
+
+def test_a_law_whose_forces_do_not_fit_is_refused_and_named(direct_differential):
+    for variant, forces, why in (('lsd_ode', (1.0,), 'front_clutch, rear_clutch'),
+                                 ('lsd_ode', (-1.0, 0.0), 'the force on front_clutch is -1')):
+        with pytest.raises(ValueError, match=why):
+            direct_differential(variant).run(lambda _, f=forces: (TORQUES, f), seconds=0.1)
+    with pytest.raises(ValueError, match='torques: .* must be 3 numbers'):
+        direct_differential('lsd_ode').run(lambda _: (1.0, 2.0), seconds=0.1)
+
+
 def test_a_direct_run_goes_by_the_law_of_losses_that_is_asked_for(direct_differential):
     torques, ends = (5.0, -10.0, -10.0), set()
     for loss_law in LOSS_LAWS:

@@ -240,7 +240,7 @@ def test_lagged_friction_is_that_of_the_given_moments(direction):
     for p, w, T, _ in random_flows(direction, 200, seed=7):
         model, before = SelfLockingModel(SelfLockingLagged, p, 1e-3), (12.0, 34.0)
         _, _, end, _, point, _, _ = model.step(
-            tuple(slip_state(p, w)), before, tuple(T), direction)
+            tuple(slip_state(p, w)), model.friction(before, (0.0, 0.0)), tuple(T), direction)
         g = p.R_2 / p.R_1
         w_end = end[0] + g / (1 + g) * end[1], end[0] - end[1] / (1 + g)
         F = [f_k * (abs(M_k) * math.tan(p.alpha) + p.n_s * N_k * R_k) for f_k, M_k, N_k, R_k
@@ -248,7 +248,7 @@ def test_lagged_friction_is_that_of_the_given_moments(direction):
                     strict=True)]
         _, M = answer(SelfLockingOde, p, direction, w_end, T, F)
         assert point[2:6] == pytest.approx((*F, *M), rel=1e-9, abs=1e-9 * np.abs(T).max())
-        assert model.remembered(point) == (abs(point[4]), abs(point[5]))
+        assert model.remembered(point, direction) == (abs(point[4]), abs(point[5]))
 
 
 @pytest.mark.parametrize('direction', BOTH)

@@ -62,7 +62,7 @@ def test_output_is_what_the_library_computes(variant):
         'time', *(f'{kind}.{name}' for kind, names in (
             ('velocity', simulation.shafts), ('position', simulation.shafts),
             ('torque', simulation.inputs), ('moment', simulation.moments)) for name in names),
-        'power_flow']
+        'power_flow', *(f'clutch_force.{name}' for name in simulation.clutches)]
     # 17 digits: bit for bit
     assert np.array_equal(np.loadtxt('OUT.csv', delimiter=',', skiprows=1), rows)
 

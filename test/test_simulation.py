@@ -70,12 +70,13 @@ def test_snapshot_holds_plain_floats_in_the_order_of_the_names(variant):
     simulation = Simulation(variant)
     for snapshot in (simulation.snapshot(), simulation.step(np.array([30, -10, -12]))):
         assert Snapshot._fields == ('time', 'velocity', 'position', 'torque', 'moment',
-                                    'power_flow')
+                                    'power_flow', 'clutch_force')
         assert len(snapshot.velocity) == len(snapshot.position) == len(simulation.shafts)
         assert len(snapshot.torque) == len(simulation.inputs)
         assert len(snapshot.moment) == len(simulation.moments)
         numbers = (snapshot.time, *snapshot.velocity, *snapshot.position, *snapshot.torque,
-                   *snapshot.moment)
+                   *snapshot.moment, *snapshot.clutch_force)
+        assert len(snapshot.clutch_force) == len(simulation.clutches)
         assert {type(n) for n in numbers} == {float}
         assert type(snapshot.power_flow) is int
     assert snapshot.torque == (30.0, -10.0, -12.0)

@@ -9,13 +9,14 @@ def column_names(mechanism):
     return ['time', *(f'velocity.{name}' for name in mechanism.shafts),
             *(f'position.{name}' for name in mechanism.shafts),
             *(f'torque.{name}' for name in mechanism.inputs),
-            *(f'moment.{name}' for name in mechanism.moments), 'power_flow']
+            *(f'moment.{name}' for name in mechanism.moments), 'power_flow',
+            *(f'clutch_force.{name}' for name in mechanism.clutches)]
 
 
 def as_row(snapshot):
     """Return a ``Snapshot`` as one flat tuple in the order of ``column_names``."""
     return (snapshot.time, *snapshot.velocity, *snapshot.position, *snapshot.torque,
-            *snapshot.moment, snapshot.power_flow)
+            *snapshot.moment, snapshot.power_flow, *snapshot.clutch_force)
 
 
 def write_csv(file, names, rows):

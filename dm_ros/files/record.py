@@ -15,8 +15,8 @@ class Record:
     What a differential reported in a run, as numpy arrays over the ticks.
 
     ``time`` (s) and ``power_flow`` (+1, -1) are arrays; ``velocity`` (rad/s), ``position``
-    (rad), ``torque`` (N m) and ``moment`` (N m) map names to arrays, such as
-    ``record.velocity['left']``.
+    (rad), ``torque`` (N m), ``moment`` (N m) and ``clutch_force`` (N) map names to arrays, such
+    as ``record.velocity['left']``.
     """
 
     def __init__(self, mechanism, rows, title):
@@ -33,10 +33,10 @@ class Record:
         self.columns = dict(zip(names, self._table.T))
         self.time = self.columns['time']
         self.power_flow = self.columns['power_flow'].astype(int)
-        self.velocity, self.position, self.torque, self.moment = (
+        self.velocity, self.position, self.torque, self.moment, self.clutch_force = (
             {name.removeprefix(kind): values for name, values in self.columns.items()
              if name.startswith(kind)}
-            for kind in ('velocity.', 'position.', 'torque.', 'moment.'))
+            for kind in ('velocity.', 'position.', 'torque.', 'moment.', 'clutch_force.'))
 
     @classmethod
     def of(cls, simulation, snapshots):

@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Torques over time from a CSV file, held from row to row, and which tick gets which row."""
+"""Torques and forces over time from a CSV file, and which tick gets which row."""
 
 from bisect import bisect_right
 import csv
@@ -15,7 +15,7 @@ class TorqueTable(NamedTuple):
     """Times, strictly increasing and none negative, and the torques from each time on."""
 
     times: tuple     # s
-    torques: tuple   # of tuples, N m, in the order of the inputs
+    torques: tuple   # of tuples: N m, in the order of the inputs, and N, in that of the clutches
 
     def held(self, dt):
         """Return the ``HeldTorques`` for ticks of the length ``dt``, s."""
@@ -38,7 +38,7 @@ class HeldTorques:
         if not 0.5 < end < 2**53:
             raise ValueError(f'time: ticks of {dt:g} s make no run to {table.times[-1]:g} s')
         self._starts = [0] + [math.ceil(time / dt - ON_TIME) for time in table.times]
-        self._torques = ((0.0, 0.0, 0.0), *table.torques)
+        self._torques = ((0.0,) * len(table.torques[0]), *table.torques)
         self._ticks = round(end)
 
     def __len__(self):
@@ -57,27 +57,30 @@ class HeldTorques:
         return self._torques[bisect_right(self._starts, tick) - 1]
 
 
-def read_torque_file(path, inputs):
+def read_torque_file(path, inputs, clutches=()):
     """
     Return the ``TorqueTable`` of a CSV file.
 
     :param inputs: names of the shafts; the header is ``time`` and these, in any order.
+    :param clutches: names of columns that may be there too, forces of at least 0; where one of
+        them is, they follow the torques in each row of the table, all of them, 0 for the others.
     :raises ValueError: one line that names file, line and column.
     """
     try:
         # utf-8-sig: spreadsheets begin the file with a byte order mark
         with open(path, newline='', encoding='utf-8-sig') as file:
-            return _table(path, csv.reader(file, strict=True), inputs)
+            return _table(path, csv.reader(file, strict=True), inputs, clutches)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{path}: not a text file in UTF-8') from None
 
 
-def _table(path, reader, inputs):
+def _table(path, reader, inputs, clutches):
     try:
         rows = (row for row in reader if any(cell.strip() for cell in row))
-        header = _header(next(rows, ()), inputs)
+        header = _header(next(rows, ()), inputs, clutches)
+        forces = clutches if set(clutches) & set(header) else ()
         times, torques = [], []
         for row in rows:
             cells = _cells(header, row)
@@ -87,7 +90,8 @@ def _table(path, reader, inputs):
             if times and not time > times[-1]:
                 raise ValueError(f"column 'time': {time!r} does not come after {times[-1]!r}")
             times.append(time)
-            torques.append(tuple(cells[name] for name in inputs))
+            torques.append((*(cells[name] for name in inputs),
+                            *(_force(name, cells.get(name, 0.0)) for name in forces)))
         if not times or times[-1] == 0.0:
             raise ValueError("column 'time': a row with a time above 0 must end the run")
     except (csv.Error, ValueError) as error:
@@ -97,17 +101,18 @@ def _table(path, reader, inputs):
     return TorqueTable(tuple(times), tuple(torques))
 
 
-def _header(row, inputs):
+def _header(row, inputs, clutches):
     names = [cell.strip() for cell in row]
     needed = ('time', *inputs)
+    known = ', '.join((*needed, *(f'{name} (if wanted)' for name in clutches)))
     for index, name in enumerate(names):
-        if name not in needed:
-            raise ValueError(f'column {name!r}: unknown, the columns are {", ".join(needed)}')
+        if name not in (*needed, *clutches):
+            raise ValueError(f'column {name!r}: unknown, the columns are {known}')
         if name in names[:index]:
             raise ValueError(f'column {name!r}: it appears twice')
     for name in needed:
         if name not in names:
-            raise ValueError(f'column {name!r}: missing, the columns are {", ".join(needed)}')
+            raise ValueError(f'column {name!r}: missing, the columns are {known}')
     return names
 
 
@@ -117,6 +122,12 @@ def _cells(header, row):
     if len(row) > len(header):
         raise ValueError(f'column {len(header) + 1}: {row[len(header)]!r} has no header')
     return {name: _number(name, cell) for name, cell in zip(header, row, strict=True)}
+
+
+def _force(name, value):
+    if value < 0.0:
+        raise ValueError(f'column {name!r}: {value!r} N is negative, a clutch can only be pressed')
+    return value
 
 
 def _number(name, cell):

@@ -13,14 +13,15 @@ preload friction S_k = n_s N_k R_k f_k::
     reverse:  eta_2G M_2 = g_12 eta_1G M_1,   -T_0 = sum(eta_0B eta_kG M_k + F_k),
               T_k = M_k + F_k
 
-With both values of sigma this gives the limits of the split; all splits between them are held
-by friction, with the shafts locked.
+An actuator's force A_k adds f_k R_k A_k to S_k; in reverse flow, where the shafts drive, x_k is
+scaled by the coast factor. With both values of sigma this gives the limits of the split; all
+splits between them are held by friction, with the shafts locked.
 """
 
 import math
 from typing import NamedTuple
 
-from dm_ros.mechanism.clutched import full_friction
+from dm_ros.mechanism.clutched import actuated, full_friction, proportional_friction
 from dm_ros.mechanism.power_flow import DIRECT
 
 
@@ -43,7 +44,7 @@ class Bias(NamedTuple):
     rear_lagging: Split
 
 
-def torque_bias(p, torque=math.inf, direction=DIRECT):
+def torque_bias(p, torque=math.inf, direction=DIRECT, forces=(0.0, 0.0)):
     """
     Return the ``Bias`` of a self-locking differential.
 
@@ -52,27 +53,30 @@ def torque_bias(p, torque=math.inf, direction=DIRECT):
         of a torque beside which the preload is nothing; the split is that of 1 N m then.
     :param direction: +1 for what a driving carrier gives to the shafts, -1 for what driving
         shafts give to a braking carrier.
+    :param forces: axial forces of the actuators on both clutches, N.
     :raises ValueError: where the torque cannot turn the shafts against the preload.
     """
     if not torque > 0.0:
         raise ValueError(f'torque: {torque!r} is not allowed, it must be above 0 N m')
-    return Bias(_split(p, torque, direction, (-1, 1)), _split(p, torque, direction, (1, -1)))
+    return Bias(_split(p, torque, direction, forces, (-1, 1)),
+                _split(p, torque, direction, forces, (1, -1)))
 
 
-def _split(p, torque, direction, sigma):
-    x, preload = full_friction(p)
+def _split(p, torque, direction, forces, sigma):
+    preload = actuated(p, full_friction(p)[1], forces)
     if math.isinf(torque):
         torque, preload = 1.0, (0.0, 0.0)
     eta, g = (p.eta_1G, p.eta_2G), (1.0, p.g_12)   # M_k = g_k M_1
     if direction != DIRECT:
         g = 1.0, p.g_12 * p.eta_1G / p.eta_2G
     moving = sum(s * S_k for s, S_k in zip(sigma, preload))
+    rest = p.eta_0B * torque + moving if direction == DIRECT else torque - moving
+    driving, coasting = proportional_friction(p)
+    x = driving if rest * direction > 0.0 else coasting
     if direction == DIRECT:
-        rest = p.eta_0B * torque + moving
         gear = sum(g_k * (1 - s * x_k * math.copysign(1, rest))
                    for g_k, s, x_k in zip(g, sigma, x))
     else:
-        rest = torque - moving
         gear = sum(g_k * (p.eta_0B * eta_k + s * x_k * math.copysign(1, rest))
                    for g_k, s, x_k, eta_k in zip(g, sigma, x, eta))
     M = [g_k * rest / gear for g_k in g]

@@ -10,6 +10,10 @@ In y = (w, s), the carrier speed omega_0 and the slip omega_1 - omega_2, under h
     M     = P y + Q T - W F
     F_k   = tanh(a_k s) (phi_k |M_k| + S_k)       (56), (58): phi_k = tan(alpha) f_k at full slip
 
+While a shaft drives the mechanism phi_k is that times the coast factor of its clutch; S_k, of the
+preload and the actuator, has none. M is in the sign of the paper, whose shaft drives where the
+direction and M differ in sign.
+
 ``Coefficients`` has the matrices as numbers for one direction of power flow, ``held`` turns the
 inputs of a step into what of them is constant, and the rest follows from both and the state. A
 ``point`` is all that is known of one state, a tuple in this order::
@@ -24,6 +28,8 @@ from math import tan, tanh
 
 import numpy as np
 
+from dm_ros.mechanism.power_flow import DIRECT
+
 
 def slip_steepness(p):
     """Return (a_1, a_2), s/rad: f_k grows with tanh(a_k (omega_1 - omega_2)), (58)."""
@@ -35,6 +41,23 @@ def full_friction(p):
     (f_1, f_2), tangent = p.f, tan(p.alpha)
     return ((f_1 * tangent, f_2 * tangent),
             (f_1 * p.n_s * p.N_1 * p.R_1, f_2 * p.n_s * p.N_2 * p.R_2))
+
+
+def proportional_friction(p):
+    """Return phi of both clutches while the mechanism drives the shafts, and while they drive."""
+    phi_1, phi_2 = full_friction(p)[0]
+    return (phi_1, phi_2), (phi_1 * p.c_1, phi_2 * p.c_2)
+
+
+def pressing(p, M_1, M_2):
+    """Return |M_k|, less the coast factor where the shaft drives; M in one sign for all flows."""
+    return (M_1 if M_1 >= 0.0 else -M_1 * p.c_1), (M_2 if M_2 >= 0.0 else -M_2 * p.c_2)
+
+
+def actuated(p, preload, forces):
+    """Return the friction at full slip of preload and axial forces, (2,), N m."""
+    (f_1, f_2), (S_1, S_2), (A_1, A_2) = p.f, preload, forces
+    return S_1 + f_1 * A_1 * p.R_1, S_2 + f_2 * A_2 * p.R_2
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,21 +94,25 @@ class Coefficients:
     Q_22: float
     a_1: float    # of the clutches
     a_2: float
-    phi_1: float
+    phi_1: float   # where M_1 > 0
     phi_2: float
+    psi_1: float   # where M_1 < 0
+    psi_2: float
 
 
-def coefficients(p, response, proportional=True):
+def coefficients(p, response, proportional=True, direction=DIRECT):
     """
     Return the ``Coefficients`` of a ``LinearResponse``.
 
     :param proportional: whether the friction grows with the moments of the same instant.
+    :param direction: of power flow, that of the response.
     """
     r = response
-    phi = full_friction(p)[0] if proportional else (0.0, 0.0)
+    phi = proportional_friction(p) if proportional else ((0.0, 0.0), (0.0, 0.0))
+    driving, coasting = phi if direction == DIRECT else phi[::-1]
     matrices = (r.A, r.C, r.P, r.W, r.B, r.Q)
     numbers = np.concatenate([np.ravel(m) for m in matrices]).tolist()
-    return Coefficients(*numbers, *slip_steepness(p), *phi)
+    return Coefficients(*numbers, *slip_steepness(p), *driving, *coasting)
 
 
 def held(k, T, S):
@@ -106,24 +133,21 @@ def evaluate(k, u, w, s):
     b_w, b_s, m_1, m_2, S_1, S_2 = u
     W_11, W_12, W_21, W_22 = k.W_11, k.W_12, k.W_21, k.W_22
     t_1, t_2 = tanh(k.a_1 * s), tanh(k.a_2 * s)
-    x_1, x_2, F_1, F_2 = k.phi_1 * t_1, k.phi_2 * t_2, S_1 * t_1, S_2 * t_2
+    F_1, F_2 = S_1 * t_1, S_2 * t_2
     z_1 = m_1 + k.P_1w * w + k.P_1s * s - W_11 * F_1 - W_12 * F_2
     z_2 = m_2 + k.P_2w * w + k.P_2s * s - W_21 * F_1 - W_22 * F_2
     # M = z - W diag(x) |M| with the signs of z, which nearly always are those of M
-    if z_1 < 0.0:
-        x_1 = -x_1
-    if z_2 < 0.0:
-        x_2 = -x_2
+    x_1 = k.phi_1 * t_1 if z_1 >= 0.0 else -(k.psi_1 * t_1)
+    x_2 = k.phi_2 * t_2 if z_2 >= 0.0 else -(k.psi_2 * t_2)
     a, b, c, d = 1 + W_11 * x_1, W_12 * x_2, W_21 * x_1, 1 + W_22 * x_2
     det = a * d - b * c
     M_1, M_2 = (d * z_1 - b * z_2) / det, (a * z_2 - c * z_1) / det
     if M_1 * z_1 < 0.0 or M_2 * z_2 < 0.0:
-        x_1, x_2 = k.phi_1 * t_1, k.phi_2 * t_2
-        M_1, M_2 = solve_moments((z_1, z_2), ((W_11, W_12), (W_21, W_22)), (x_1, x_2))
-        if M_1 < 0.0:
-            x_1 = -x_1
-        if M_2 < 0.0:
-            x_2 = -x_2
+        M_1, M_2 = solve_moments(
+            (z_1, z_2), ((W_11, W_12), (W_21, W_22)), (k.phi_1 * t_1, k.phi_2 * t_2),
+            (k.psi_1 * t_1, k.psi_2 * t_2))
+        x_1 = k.phi_1 * t_1 if M_1 >= 0.0 else -(k.psi_1 * t_1)
+        x_2 = k.phi_2 * t_2 if M_2 >= 0.0 else -(k.psi_2 * t_2)
     F_1 += x_1 * M_1
     F_2 += x_2 * M_2
     return (b_w + k.A_ww * w + k.A_ws * s - k.C_w1 * F_1 - k.C_w2 * F_2,
@@ -140,8 +164,9 @@ def jacobian(k, u, point):
     _, _, _, _, S_1, S_2 = u
     _, _, _, _, M_1, M_2, t_1, t_2, x_1, x_2 = point
     # dF = diag(x) dM + N ds with dM = P dy - W dF, so (I + diag(x) W) dF = ...
-    N_1 = (k.phi_1 * abs(M_1) + S_1) * k.a_1 * (1 - t_1 * t_1)
-    N_2 = (k.phi_2 * abs(M_2) + S_2) * k.a_2 * (1 - t_2 * t_2)
+    phi_1, phi_2 = k.phi_1 if M_1 >= 0.0 else k.psi_1, k.phi_2 if M_2 >= 0.0 else k.psi_2
+    N_1 = (phi_1 * abs(M_1) + S_1) * k.a_1 * (1 - t_1 * t_1)
+    N_2 = (phi_2 * abs(M_2) + S_2) * k.a_2 * (1 - t_2 * t_2)
     a, b, c, d = 1 + x_1 * k.W_11, x_1 * k.W_12, x_2 * k.W_21, 1 + x_2 * k.W_22
     det = a * d - b * c
     r_1, r_2 = x_1 * k.P_1w, x_2 * k.P_2w
@@ -153,7 +178,7 @@ def jacobian(k, u, point):
             (F_1w, F_1s, F_2w, F_2s))
 
 
-def solve_moments(z, W, x):
+def solve_moments(z, W, x, coasting=None):
     """
     Solve ``M = z - W diag(x) |M|`` for the gear moments.
 
@@ -164,15 +189,17 @@ def solve_moments(z, W, x):
     :param z: gear moments without the proportional friction, (2,), N m.
     :param W: influence of the clutch moments on the gear moments, (2, 2).
     :param x: signed proportional friction factors tan(alpha) f_k, (2,).
+    :param coasting: those where M_k < 0, if they differ.
     :return: ``(M_1, M_2)``, N m.
     """
     (W_11, W_12), (W_21, W_22) = W
+    y = x if coasting is None else coasting
     best = None
-    for sign_1 in (1.0, -1.0):
-        for sign_2 in (1.0, -1.0):
+    for sign_1, x_1 in ((1.0, x[0]), (-1.0, y[0])):
+        for sign_2, x_2 in ((1.0, x[1]), (-1.0, y[1])):
             # (I + W diag(x sign)) M = z
-            a, b = 1 + W_11 * x[0] * sign_1, W_12 * x[1] * sign_2
-            c, d = W_21 * x[0] * sign_1, 1 + W_22 * x[1] * sign_2
+            a, b = 1 + W_11 * x_1 * sign_1, W_12 * x_2 * sign_2
+            c, d = W_21 * x_1 * sign_1, 1 + W_22 * x_2 * sign_2
             det = a * d - b * c
             M_1, M_2 = (d * z[0] - b * z[1]) / det, (a * z[1] - c * z[0]) / det
             wrong = max(0.0, -M_1 * sign_1, -M_2 * sign_2)

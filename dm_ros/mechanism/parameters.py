@@ -213,6 +213,13 @@ def clutch(shaft, symbol):
                    f'mean friction radius of the {shaft} clutch ({ASSUMED})', above_low=True),
         'N': row(f'{name}.preload', 100.0, 'N', 0.0, 1e6,
                  f'axial preload of the {shaft} clutch, for each satellite ({ASSUMED})'),
+        'c': row(f'{name}.coast_factor', 1.0, '1', 0.0, 1.0,
+                 f'share of its load-proportional friction that the {shaft} clutch has while the '
+                 'shaft drives; 1: a 2-way, 0: a 1-way differential'),
+        'tau': row(f'{name}.actuator_time_constant', 0.0, 's', 0.0, 1e3,
+                   f'lag of the force on the {shaft} clutch; 0 for none'),
+        'A': row(f'{name}.actuator_limit', 1e6, 'N', 0.0, 1e9,
+                 f'a larger force on the {shaft} clutch is clamped to this'),
     }[symbol]
 
 
@@ -258,6 +265,12 @@ class SelfLockingParameters(Parameters):
     R_F2: float = clutch('rear', 'R_F')
     N_1: float = clutch('front', 'N')
     N_2: float = clutch('rear', 'N')
+    c_1: float = clutch('front', 'c')
+    c_2: float = clutch('rear', 'c')
+    tau_1: float = clutch('front', 'tau')
+    tau_2: float = clutch('rear', 'tau')
+    A_1: float = clutch('front', 'A')
+    A_2: float = clutch('rear', 'A')
 
     @property
     def g_12(self):

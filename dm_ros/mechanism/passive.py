@@ -39,7 +39,7 @@ from dataclasses import dataclass
 from itertools import product
 from math import isfinite, tanh
 
-from dm_ros.mechanism.clutched import full_friction, slip_steepness
+from dm_ros.mechanism.clutched import proportional_friction, slip_steepness
 from dm_ros.mechanism.efficiencies import Efficiencies
 from dm_ros.mechanism.losses import lost_in_bearing
 
@@ -79,8 +79,10 @@ class Coefficients:
     bearing_3: float
     a_1: float         # of the clutches, see ``clutched``
     a_2: float
-    phi_1: float
+    phi_1: float       # while the mechanism drives the shaft
     phi_2: float
+    psi_1: float       # while the shaft drives
+    psi_2: float
 
 
 def coefficients(p, clutches, proportional=True):
@@ -95,14 +97,14 @@ def coefficients(p, clutches, proportional=True):
     spin = p.n_s * k_2 / p.g_2s**2
     eta_F, eta_3B = getattr(p, 'eta_FG', 1.0), getattr(p, 'eta_3B', 1.0)
     a = slip_steepness(p) if clutches else (0.0, 0.0)
-    phi = full_friction(p)[0] if clutches and proportional else (0.0, 0.0)
+    phi, psi = proportional_friction(p) if clutches and proportional else ((0.0, 0.0), (0.0, 0.0))
     return Coefficients(
         p.sign_speed, g_12, g_12 * k_2, k_2, getattr(p, 'g_F', 0.0),
         p.I_0, p.I_1, p.I_2, getattr(p, 'I_3', 0.0), spin * p.I_s,
         p.l_0, p.l_1, p.l_2, getattr(p, 'l_3', 0.0), spin * p.l_s,
         (1 + p.eta_1G) / 2, (1 + p.eta_2G) / 2, (1 + eta_F) / 2,
         (1 - p.eta_1G) / 2, (1 - p.eta_2G) / 2, (1 - eta_F) / 2,
-        lost_in_bearing(p.eta_0B), lost_in_bearing(eta_3B), *a, *phi)
+        lost_in_bearing(p.eta_0B), lost_in_bearing(eta_3B), *a, *phi, *psi)
 
 
 def has_solutions(k):
@@ -162,7 +164,8 @@ def solve(k, u, q_1, q_2, state, signs):
     w, s, sigma_0, sigma_1, sigma_2, t_1, t_2 = state
     s_1, s_2, s_F, h_N, b = signs
     h_1, h_2 = k.half_1 * sigma_1 * s_1, k.half_2 * sigma_2 * s_2
-    x_1, x_2 = k.phi_1 * t_1 * s_1, k.phi_2 * t_2 * s_2          # F_k = x_k M_k + preload
+    x_1 = k.phi_1 * t_1 * s_1 if s_1 > 0.0 else k.psi_1 * t_1 * s_1   # F_k = x_k M_k + S_k t_k
+    x_2 = k.phi_2 * t_2 * s_2 if s_2 > 0.0 else k.psi_2 * t_2 * s_2
     n_1, n_2 = k.mean_1 + h_1, k.mean_2 + h_2                    # N_k = n_k M_k
     p_1, p_2 = k.mean_1 - h_1 - x_1, k.mean_2 - h_2 - x_2        # S_k - F_k = p_k M_k - preload
     m_1, m_2, r_1, r_2 = k.I_1 / p_1, k.I_2 / p_2, q_1 / p_1, q_2 / p_2   # M_k = m_k e_k + r_k
@@ -236,7 +239,8 @@ def jacobian(k, u, point):
     n_2w = k.half_2 * s_2 * (1 - sigma_2 * sigma_2) / k.sign_speed
     n_1s, n_2s = n_1w * k.k_1, -n_2w * k.k_2
     u_1, u_2 = k.a_1 * (1 - t_1 * t_1), k.a_2 * (1 - t_2 * t_2)
-    x_1s, x_2s = k.phi_1 * s_1 * u_1, k.phi_2 * s_2 * u_2
+    phi_1, phi_2 = k.phi_1 if s_1 > 0.0 else k.psi_1, k.phi_2 if s_2 > 0.0 else k.psi_2
+    x_1s, x_2s = phi_1 * s_1 * u_1, phi_2 * s_2 * u_2
     q_1s, q_2s = k.l_1 * k.k_1 + S_1 * u_1, S_2 * u_2 - k.l_2 * k.k_2
     M_1w, M_1s = M_1 * n_1w / p_1, (q_1s + M_1 * (n_1s + x_1s)) / p_1
     M_2w, M_2s = M_2 * n_2w / p_2, (q_2s + M_2 * (n_2s + x_2s)) / p_2
@@ -249,7 +253,7 @@ def jacobian(k, u, point):
         side = -1.0 if w < 0.0 else 1.0
         beta_w = k.bearing_0 * side * sigma_w * b
         N = n_1 * M_1 + n_2 * M_2
-        x_M = k.phi_1 * t_1 * s_1 * M_1 + k.phi_2 * t_2 * s_2 * M_2
+        x_M = phi_1 * t_1 * s_1 * M_1 + phi_2 * t_2 * s_2 * M_2
         g_w += beta_w * (h_N * N + X - x_M)
         if k.g_F:
             h = k.half_F * sigma_0 * s_F

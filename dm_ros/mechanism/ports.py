@@ -15,22 +15,26 @@ class Port(NamedTuple):
     name: str     # of the element on which it acts
     kind: str     # what it is, such as ``torque``
     unit: str
-    low: float    # what may come in; infinity itself never may
-    high: float
+    low: float    # the least that may come in; infinity itself never may
 
     def refusal(self, value):
         """Return why a value must not come in, in words, or None."""
         what = f'the {self.kind} on {self.name} is {value}'
         if not math.isfinite(value):
             return what
-        if not self.low <= value <= self.high:
-            return f'{what}, it must be in [{self.low:g}, {self.high:g}]'
+        if value < self.low:
+            return f'{what}, it must not be below {self.low:g}'
         return None
 
 
 def torque(shaft):
     """Return the port of an external torque on a shaft."""
-    return Port(shaft, 'torque', 'N m', -math.inf, math.inf)
+    return Port(shaft, 'torque', 'N m', -math.inf)
+
+
+def force(clutch):
+    """Return the port of the axial force of an actuator on a clutch; it can only press."""
+    return Port(clutch, 'force', 'N', 0.0)
 
 
 def acting_on(elements, ports):

@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dm_ros.mechanism.efficiencies import of_flow
-from dm_ros.mechanism.ports import acting_on, torque
+from dm_ros.mechanism.ports import acting_on, force, torque
 from dm_ros.mechanism.power_flow import REVERSE
 
 SHAFTS = ('carrier', 'front', 'rear', 'satellite')
@@ -40,7 +40,8 @@ PORTS = torque('carrier'), torque('front'), torque('rear')
 OUTPUTS = ('front', 'rear')
 GEARS = ('front_mesh', 'rear_mesh')
 BEARINGS = ('carrier_bearing',)
-CLUTCHES = ('front_clutch', 'rear_clutch')
+CLUTCHES = ('front', 'rear')
+ACTUATORS = force('front_clutch'), force('rear_clutch')
 ON_SHAFTS = acting_on(SHAFTS, PORTS)
 
 

@@ -22,7 +22,8 @@ class Mechanism(NamedTuple):
     outputs: tuple      # names of the two output shafts
     gears: tuple        # names of the gear meshes, each with an internal moment
     bearings: tuple     # names of the bearings that lose
-    clutches: tuple     # names of the clutches, each with an internal moment
+    clutches: tuple     # names of the shafts with a clutch against the carrier
+    actuators: tuple    # of ``Port``, the forces on the clutches, in their order; each a moment
     load: Callable      # reference load: time in s -> torques on the ports, N m
 
     @property
@@ -31,9 +32,14 @@ class Mechanism(NamedTuple):
         return tuple(port.name for port in self.ports)
 
     @property
+    def clutch_moments(self):
+        """Names of the clutches as internal moments, which are those of their actuators too."""
+        return tuple(port.name for port in self.actuators)
+
+    @property
     def moments(self):
         """Names of the internal moments."""
-        return self.gears + self.clutches
+        return self.gears + self.clutch_moments
 
 
 class Variant(NamedTuple):
@@ -50,12 +56,12 @@ SYMMETRIC = Mechanism(
     name='symmetric', title='symmetric differential', source='Table 1', variant='symmetric_ode',
     parameters=SymmetricParameters, ports=symmetric.PORTS, shafts=symmetric.SHAFTS,
     outputs=symmetric.OUTPUTS, gears=symmetric.GEARS, bearings=symmetric.BEARINGS, clutches=(),
-    load=loads.symmetric)
+    actuators=(), load=loads.symmetric)
 SELF_LOCKING = Mechanism(
     name='lsd', title='self-locking differential', source='Table 2', variant='lsd_ode',
     parameters=SelfLockingParameters, ports=self_locking.PORTS, shafts=self_locking.SHAFTS,
     outputs=self_locking.OUTPUTS, gears=self_locking.GEARS, bearings=self_locking.BEARINGS,
-    clutches=self_locking.CLUTCHES, load=loads.self_locking)
+    clutches=self_locking.CLUTCHES, actuators=self_locking.ACTUATORS, load=loads.self_locking)
 MECHANISMS = {mechanism.name: mechanism for mechanism in (SYMMETRIC, SELF_LOCKING)}
 
 CATALOGUE = {variant.name: variant for variant in (

@@ -24,7 +24,7 @@ from operator import add
 from typing import NamedTuple
 
 from dm_ros.motion.meters import meter_of
-from dm_ros.motion.simulation import Simulation
+from dm_ros.motion.simulation import NO_FORCE, Simulation
 from dm_ros.motion.state import Snapshot
 
 AT_REST = 1e-6    # of the stored energy: with less turned over, its rounding is all there is
@@ -198,7 +198,7 @@ class AuditedSimulation(Simulation):
     @property
     def clutch_names(self):
         """Names of the clutches, in the order of ``Energy.clutches``."""
-        return self.mechanism.clutches
+        return self.mechanism.clutch_moments
 
     def prepare(self, parameters, substeps=None):
         model, substeps = super().prepare(parameters, substeps)
@@ -229,8 +229,8 @@ class AuditedSimulation(Simulation):
         may_return = len(self.gear_names + self.bearing_names)
         self._returned_ticks, self._returned = [0] * may_return, [0.0] * may_return
 
-    def advance(self, torques):
-        steps = super().advance(torques)
+    def advance(self, torques, clutch_forces=NO_FORCE):
+        steps = super().advance(torques, clutch_forces)
         meter, T, layout = self._meter, self._torque, self._layout
         tick = meter.book(steps[0], T)
         if len(steps) > 1:

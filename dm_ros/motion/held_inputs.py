@@ -12,17 +12,17 @@ class HeldInputs:
     mechanism does not lose its inputs.
     """
 
-    def __init__(self, ports, limit, timeout):
+    def __init__(self, ports, limits, timeout):
         """
         Start without any demand.
 
         :param ports: the ``Port`` s of a mechanism; the inputs in force follow their order.
-        :param limit: larger demands are clamped to it, in the unit of the ports.
+        :param limits: of each port, larger demands are clamped to it, in the unit of the port.
         :param timeout: ticks, an older demand counts as zero; 0 for never.
         """
         self.ports = ports
         self.names = tuple(port.name for port in ports)
-        self.limit = limit
+        self.limits = limits
         self.timeout = timeout
         self.received = self.refused = self.clamped = 0
         self._index = {name: i for i, name in enumerate(self.names)}
@@ -33,19 +33,20 @@ class HeldInputs:
         self._demand = [0.0] * len(self.ports)
         self._arrival = [None] * len(self.ports)
 
-    def demand(self, names, values, tick):
+    def demand(self, names, values, tick, sparse=False):
         """
-        Take a demand for some ports at a tick; return whether any of it was clamped.
+        Take a demand for some ports at a tick; return ``(port, limit)`` where it was clamped.
 
+        :param sparse: whether NaN stands for no demand: the port keeps the older one, and its age.
         :raises ValueError: says why the demand is refused; the older one stays.
         """
         try:
-            clamped = self._take(names, values, tick)
+            clamped = self._take(names, values, tick, sparse)
         except ValueError:
             self.refused += 1
             raise
         self.received += 1
-        self.clamped += clamped
+        self.clamped += bool(clamped)
         return clamped
 
     def in_force(self, tick):
@@ -65,20 +66,26 @@ class HeldInputs:
         """Return the names of the ports that never had a demand."""
         return [name for name, arrival in zip(self.names, self._arrival) if arrival is None]
 
-    def _take(self, names, values, tick):
+    def _take(self, names, values, tick, sparse):
         if len(names) != len(values):
             raise ValueError(f'{len(names)} names but {len(values)} values')
         if len(set(names)) != len(names):
-            raise ValueError(f'a shaft is named twice in {", ".join(names)}')
+            raise ValueError(f'a name comes twice in {", ".join(names)}')
+        demands = []
         for name, value in zip(names, values):
             if name not in self._index:
                 raise ValueError(f'{name!r} is not one of {", ".join(self.names)}')
-            if refusal := self.ports[self._index[name]].refusal(value):
-                raise ValueError(refusal)
-        clamped = False
-        for name, value in zip(names, values):
+            if sparse and value != value:   # NaN
+                continue
             i = self._index[name]
-            self._demand[i] = min(max(value, -self.limit), self.limit)
+            if refusal := self.ports[i].refusal(value):
+                raise ValueError(refusal)
+            demands.append((i, value))
+        clamped = []
+        for i, value in demands:
+            limit = self.limits[i]
+            self._demand[i] = min(max(value, -limit), limit)
             self._arrival[i] = tick
-            clamped = clamped or abs(value) > self.limit
+            if abs(value) > limit:
+                clamped.append((self.ports[i], limit))
         return clamped

@@ -6,7 +6,9 @@ One variant with one set of parameters and one step length: equations and steppe
 
 A model is immutable and holds no state, so that it can be exchanged for another between two
 steps. What it needs of a ``State`` is handed in: the speeds x, the torques T, the power flow
-and, for the friction of ``lsd_lagged``, the memory. ``step`` returns what it did, a tuple::
+and S, the friction of the clutches at full slip that does not follow the moments of the step,
+which ``friction`` makes of axial forces and, for ``lsd_lagged``, the memory. ``step`` returns
+what it did, a tuple::
 
     (x, flow, end, integral, point, coarse, path)
 
@@ -79,12 +81,15 @@ class SymmetricModel:
         return power_flow(T_3 * self._g_F * (x_1 + x_2) / 2, T_1 * x_1 + T_2 * x_2, deadband,
                           last)
 
-    def step(self, x, memory, T, direction):
+    def step(self, x, S, T, direction):
         """Advance by h; see the module for what is returned."""
         end, integral = held_torque.step(self._step[direction], x, T)
         return x, direction, end, integral, None, False, None
 
-    def point(self, x, memory, T, direction):
+    def friction(self, memory, forces):
+        """Return None: there is no clutch."""
+
+    def point(self, x, S, T, direction):
         """Return None: the moments need no point."""
 
     def internal_moments(self, x, T, direction, point):
@@ -104,7 +109,8 @@ class SelfLockingModel:
         # |M| of the last step feeds the friction of the next, which amplifies errors
         self._tolerance = adaptive.TOLERANCE / 5 if self.lagged else adaptive.TOLERANCE
         self.coefficients = {
-            direction: clutched.coefficients(parameters, response, not self.lagged)
+            direction: clutched.coefficients(
+                parameters, response, not self.lagged, direction)
             for direction, response in self.responses.items()}
 
     def independent(self, omega_1, omega_2):
@@ -123,35 +129,36 @@ class SelfLockingModel:
         T_0, T_1, T_2 = T
         return power_flow(T_0 * x_0, T_1 * x_1 + T_2 * x_2, deadband, last)
 
-    def step(self, x, memory, T, direction):
+    def step(self, x, S, T, direction):
         """Advance by h; see the module for what is returned."""
         k = self.coefficients[direction]
-        u = clutched.held(k, T, self._friction(memory))
+        u = clutched.held(k, T, S)
         end, integral, point, coarse, parts = adaptive.step(
             adaptive.PAPER, k, u, x, self.h, self._tolerance)
         return x, direction, end, integral, point, coarse, (u, parts)
 
-    def point(self, x, memory, T, direction):
+    def point(self, x, S, T, direction):
         """Return the point at a state, see ``clutched``."""
         k = self.coefficients[direction]
-        return clutched.evaluate(k, clutched.held(k, T, self._friction(memory)), *x)
+        return clutched.evaluate(k, clutched.held(k, T, S), *x)
 
     def internal_moments(self, x, T, direction, point):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
         _, _, F_1, F_2, M_1, M_2, _, _, _, _ = point
         return direction * M_1, direction * M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
 
-    def remembered(self, point):
+    def remembered(self, point, direction):
         """Return the ``|M|`` that the friction of the next step of ``lsd_lagged`` knows."""
         _, _, _, _, M_1, M_2, _, _, _, _ = point
-        return abs(M_1), abs(M_2)
+        return clutched.pressing(self.parameters, direction * M_1, direction * M_2)
 
-    def _friction(self, memory):
-        """Return the friction at full slip that does not follow M in the step, N m."""
+    def friction(self, memory, forces):
+        """Return S, see the module, N m, under axial forces on the clutches, N."""
+        S_1, S_2 = clutched.actuated(self.parameters, self._preload, forces)
         if not self.lagged:
-            return self._preload
+            return S_1, S_2
         # variant 1: with |M| of the preceding step the whole friction is of that kind
-        (phi_1, phi_2), (S_1, S_2), (M_1, M_2) = self._phi, self._preload, memory
+        (phi_1, phi_2), (M_1, M_2) = self._phi, memory
         return phi_1 * M_1 + S_1, phi_2 * M_2 + S_2
 
 
@@ -162,7 +169,7 @@ class PassiveModel:
         self.parameters, self.h = parameters, h
         self.lagged = getattr(formulation, 'lagged', False)
         responses_of(formulation, parameters)   # refuses what overflows
-        clutches = bool(mechanism.clutches)
+        self._clutches = clutches = bool(mechanism.clutches)
         self.k = passive.coefficients(parameters, clutches, not self.lagged)
         if not passive.has_solutions(self.k):
             raise no_solution(parameters)
@@ -189,35 +196,38 @@ class PassiveModel:
         k, (w, _) = self.k, x
         return who_drives(T[0] * (k.g_F or 1.0) * w, abs(w) > k.sign_speed, deadband, last)
 
-    def step(self, x, memory, T, flow):
+    def step(self, x, S, T, flow):
         """Advance by h; see the module for what is returned."""
-        u = passive.held(T, self._friction(memory))
+        u = passive.held(T, S)
         return self._adaptive_step(x, u, flow)
 
-    def point(self, x, memory, T, flow):
+    def point(self, x, S, T, flow):
         """Return the point at a state, see ``passive``."""
-        return passive.evaluate(self.k, passive.held(T, self._friction(memory)), *x)
+        return passive.evaluate(self.k, passive.held(T, S), *x)
 
     def internal_moments(self, x, T, flow, point):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
         _, _, F_1, F_2, M_1, M_2, *_ = point
         return M_1, M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
 
-    def remembered(self, point):
+    def remembered(self, point, flow):
         """Return the ``|M|`` that the friction of the next step of ``lsd_lagged`` knows."""
         _, _, _, _, M_1, M_2, *_ = point
-        return abs(M_1), abs(M_2)
+        return clutched.pressing(self.parameters, M_1, M_2)
 
     def _adaptive_step(self, x, u, flow, here=None):
         end, integral, point, coarse, parts = adaptive.step(
             adaptive.PASSIVE, self.k, u, x, self.h, self._tolerance, here)
         return x, flow, end, integral, point, coarse, (u, parts)
 
-    def _friction(self, memory):
-        """Return the friction at full slip that does not follow M in the step, N m."""
-        if not self.lagged:
+    def friction(self, memory, forces):
+        """Return S, see the module, N m, under axial forces on the clutches, N."""
+        if not self._clutches:
             return self._preload
-        (phi_1, phi_2), (S_1, S_2), (M_1, M_2) = self._phi, self._preload, memory
+        S_1, S_2 = clutched.actuated(self.parameters, self._preload, forces)
+        if not self.lagged:
+            return S_1, S_2
+        (phi_1, phi_2), (M_1, M_2) = self._phi, memory
         return phi_1 * M_1 + S_1, phi_2 * M_2 + S_2
 
 
@@ -229,9 +239,9 @@ class PassiveSymmetricModel(PassiveModel):
         self._patterns = Patterns(formulation(parameters), parameters, self.k, h)
         self._guess = None   # the pattern met last: where it fits, it is the one
 
-    def step(self, x, memory, T, flow):
+    def step(self, x, S, T, flow):
         """Advance by h; see the module for what is returned."""
-        u, here = passive.held(T, self._preload), None
+        u, here = passive.held(T, S), None
         patterns = self._patterns
         if patterns.has_one_at(x):
             guess = self._guess
@@ -247,9 +257,9 @@ class PassiveSymmetricModel(PassiveModel):
         x, flow, end, integral, point, coarse, path = self._adaptive_step(x, u, flow, here)
         return x, flow, end, integral, self._with_pattern(end, u, point), coarse, path
 
-    def point(self, x, memory, T, flow):
+    def point(self, x, S, T, flow):
         """Return the pattern at a state, or its point where there is none."""
-        u = passive.held(T, self._preload)
+        u = passive.held(T, S)
         return self._with_pattern(x, u, passive.evaluate(self.k, u, *x))
 
     def _with_pattern(self, x, u, point):

@@ -15,6 +15,8 @@ from dm_ros.mechanism.variants import variant_named
 from dm_ros.motion.models import LOSS_LAWS, model_of, PASSIVE
 from dm_ros.motion.state import Snapshot, State
 
+NO_FORCE = (0.0, 0.0)   # on both clutches, where there are any
+
 
 class Simulation:
     """
@@ -68,6 +70,11 @@ class Simulation:
     def outputs(self):
         """Names of the two output shafts."""
         return self.mechanism.outputs
+
+    @property
+    def clutches(self):
+        """Names of the clutches that an axial force can press."""
+        return self.mechanism.clutches
 
     @property
     def moments(self):
@@ -146,12 +153,12 @@ class Simulation:
         One that a simulation of the same variant, law and parameters had may be put back.
         """
         return State(self._x, self._turned, self._origin, self._torque, self._flow,
-                     self._memory)
+                     self._memory, self._force)
 
     @state.setter
     def state(self, state):
         (self._x, self._turned, self._origin, self._torque, self._flow,
-         self._memory) = state
+         self._memory, self._force) = state
         self._point = None
 
     def prepare(self, parameters, substeps=None):
@@ -182,6 +189,7 @@ class Simulation:
         """Take what ``prepare`` made; the speeds of the output shafts and all angles go on."""
         old = self._model
         self._model, self._substeps = prepared
+        self._actuators = actuators_of(self._model.parameters, self.clutches, self.dt)
         if old is not None:
             self._origin = self._positions(old)
             self._turned = (0.0, 0.0)
@@ -190,43 +198,51 @@ class Simulation:
             self._point = None
 
     def reset(self):
-        """Go back to the start: time, angles and torques zero, initial speeds, index +1."""
+        """Go back to the start: time, angles, torques, forces zero, initial speeds, index +1."""
         self._ticks = 0
         self._coarse_steps = 0
         model = self._model
         self.state = State(
             x=model.independent(*self._initial_velocity), turned=(0.0, 0.0),
             origin=(0.0,) * len(self.shafts), torque=(0.0,) * len(self.inputs),
-            power_flow=DIRECT, memory=(0.0, 0.0) if model.lagged else ())
+            power_flow=DIRECT, memory=(0.0, 0.0) if model.lagged else (),
+            force=(0.0,) * len(self.clutches))
 
-    def step(self, torques):
-        """Advance one tick under the torques, as ``advance``, and return its ``Snapshot``."""
-        self.advance(torques)
+    def step(self, torques, clutch_forces=NO_FORCE):
+        """Advance one tick, as ``advance``, and return its ``Snapshot``."""
+        self.advance(torques, clutch_forces)
         return self.snapshot()
 
-    def advance(self, torques):
+    def advance(self, torques, clutch_forces=NO_FORCE):
         """
         Advance one tick; return the solver steps that did it, as ``models`` tells them.
 
         :param torques: N m, in the order of ``inputs``, held in the tick.
-        :raises ValueError: for torques that are not as many finite numbers as there are inputs,
-            or that lead out of the range of floating point numbers; the state stays what it was.
+        :param clutch_forces: axial forces that the actuators are told to press the clutches with,
+            N, in the order of ``clutches``, beside their preload. The force follows with the time
+            constant of the actuator, up to its limit.
+        :raises ValueError: for torques or forces that are not as many finite numbers as there are
+            inputs or clutches, for a force below 0, or for what leads out of the range of floating
+            point numbers; the state stays what it was.
         """
         T = self._checked_torques(torques)
+        force = self._pressed(clutch_forces)
         model, deadband = self._model, self._deadband
         x, memory, flow = self._x, self._memory, self._flow
         lagged, point = model.lagged, self._point
         if lagged and point is None:
-            point = model.point(x, memory, self._torque, flow)
+            point = model.point(x, model.friction(memory, self._force), self._torque, flow)
+        S = model.friction(memory, force)
         turned_1, turned_2 = self._turned
         coarse_steps = 0
         steps = []
         try:
             for _ in range(self._substeps):
-                flow = model.flow(x, T, deadband, flow)
+                was, flow = flow, model.flow(x, T, deadband, flow)
                 if lagged:
-                    memory = model.remembered(point)
-                step = model.step(x, memory, T, flow)
+                    memory = model.remembered(point, was)
+                    S = model.friction(memory, force)
+                step = model.step(x, S, T, flow)
                 _, _, x, (angle_1, angle_2), point, coarse, _ = step
                 turned_1 += angle_1
                 turned_2 += angle_2
@@ -238,7 +254,7 @@ class Simulation:
         if not in_range:
             raise ValueError(f'torques: {T} lead out of the range of floating point numbers')
         self._x, self._turned, self._torque = x, (turned_1, turned_2), T
-        self._flow, self._memory, self._point = flow, memory, point
+        self._flow, self._memory, self._point, self._force = flow, memory, point, force
         self._coarse_steps += coarse_steps
         self._ticks += 1
         return steps
@@ -250,28 +266,65 @@ class Simulation:
     def _report(self):
         model, x, T, flow = self._model, self._x, self._torque, self._flow
         if self._point is None:
-            self._point = model.point(x, self._memory, T, flow)
+            self._point = model.point(x, model.friction(self._memory, self._force), T, flow)
         return (self._ticks * self.dt, model.all_shafts(x), self._positions(model), T,
-                model.internal_moments(x, T, flow, self._point), flow)
+                model.internal_moments(x, T, flow, self._point), flow, self._force)
 
     def _positions(self, model):
         return tuple(map(add, self._origin, model.all_shafts(self._turned)))
 
     def _checked_torques(self, torques):
-        ports = self.mechanism.ports
-        try:
-            T = tuple(map(float, torques))
-            fits = len(T) == len(ports)
-        except (TypeError, ValueError, OverflowError):
-            fits = False
-        if not fits:
-            raise ValueError(f'torques: {torques!r} must be {len(ports)} numbers, '
-                             f'for {", ".join(self.inputs)}')
+        T = numbers_for('torques', torques, self.mechanism.ports)
         if not math.isfinite(sum(T)):   # as nearly never
-            for port, value in zip(ports, T):
-                if refusal := port.refusal(value):
-                    raise ValueError(f'torques: {refusal}')
+            refuse('torques', T, self.mechanism.ports)
         return T
+
+    def _pressed(self, commands):
+        """Return the forces in force in the next tick."""
+        if commands is NO_FORCE and not any(self._force):
+            return self._force
+        ports = self.mechanism.actuators
+        if not ports:
+            if tuple(commands) not in ((), NO_FORCE):
+                raise ValueError(f'clutch_forces: {commands!r} is not allowed, there is no clutch')
+            return ()
+        A = numbers_for('clutch_forces', commands, ports)
+        refuse('clutch_forces', A, ports)
+        return tuple([rise_to(before, min(command, limit), rise) for before, command, (limit, rise)
+                      in zip(self._force, A, self._actuators)])
+
+
+def actuators_of(p, clutches, dt):
+    """Return ``(limit, rise)`` of each clutch: the share of the way to it that a tick takes."""
+    if not clutches:
+        return ()
+    return tuple([(limit, 1.0 if not tau else -math.expm1(-dt / tau))
+                  for limit, tau in ((p.A_1, p.tau_1), (p.A_2, p.tau_2))])
+
+
+def rise_to(before, command, rise):
+    """Return a force after a tick of its lag; the command itself without any."""
+    return command if rise == 1.0 else before + (command - before) * rise
+
+
+def numbers_for(what, values, ports):
+    """Return values as floats, as many as there are ports; raise ValueError that names them."""
+    try:
+        numbers = tuple(map(float, values))
+        fits = len(numbers) == len(ports)
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        raise ValueError(f'{what}: {values!r} must be {len(ports)} numbers, '
+                         f'for {", ".join(port.name for port in ports)}')
+    return numbers
+
+
+def refuse(what, values, ports):
+    """Raise ValueError where a port does not take its value."""
+    for port, value in zip(ports, values):
+        if refusal := port.refusal(value):
+            raise ValueError(f'{what}: {refusal}')
 
 
 def checked(name, value, fits, allowed):

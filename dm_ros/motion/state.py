@@ -19,6 +19,7 @@ class State(NamedTuple):
     torque: tuple     # N m, held in the last tick, in the order of the ports
     power_flow: int   # +1 or -1, as it was in force
     memory: tuple     # N m, |M| as the friction of ``lsd_lagged`` knew it; () for others
+    force: tuple      # N, in force on the clutches in the last tick, in their order
 
 
 class Snapshot(NamedTuple):
@@ -30,3 +31,4 @@ class Snapshot(NamedTuple):
     torque: tuple      # N m, held in the tick, in the order of ``Simulation.inputs``
     moment: tuple      # N m, in the order of ``Simulation.moments``
     power_flow: int    # +1 direct, -1 reverse, as it was in force
+    clutch_force: tuple = ()   # N, in force in the tick, in the order of ``Simulation.clutches``

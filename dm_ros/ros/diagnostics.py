@@ -82,17 +82,23 @@ class Diagnostics:
 
     def _torques(self):
         plant = self._node.plant
-        inputs = plant.inputs
-        silent, stale = inputs.silent(), inputs.stale(plant.simulation.ticks)
+        inputs, simulation = plant.inputs, plant.simulation
+        silent, stale = inputs.silent(), inputs.stale(simulation.ticks)
+        shafts = [name for name in silent if name in simulation.inputs]
+        clutches = [name for name in silent if name not in simulation.inputs]
+        forces = zip(simulation.mechanism.actuators, simulation.state.force)
         return self._status(
             'torques', active(plant.refusing, plant.clamping, plant.stale),
-            'no torque yet' if len(silent) == len(inputs.ports) else 'fine', {
+            'no torque yet' if len(shafts) == len(simulation.inputs) else 'fine', {
                 'received messages': inputs.received,
                 'refused messages': inputs.refused,
                 'last refused': plant.refusing.reason or 'none',
                 'clamped messages': inputs.clamped,
                 'stale': ', '.join(stale) or 'none',
-                'without any torque yet': ', '.join(silent) or 'none'})
+                'without any torque yet': ', '.join(shafts) or 'none',
+                **({'without any force yet': ', '.join(clutches) or 'none'}
+                   if simulation.clutches else {}),
+                **{f'force on {clutch.name} [N]': f'{force:g}' for clutch, force in forces}})
 
     def _connections(self):
         misfits = '; '.join(f'{t}: {what}' for t, what in self._node.neighbours.misfits().items())

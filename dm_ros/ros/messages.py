@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Snapshots and torques as ROS messages, and the names of topics."""
+"""Snapshots as ROS messages, and the quality of service of topics."""
 
 from array import array
 
@@ -38,16 +38,22 @@ def never_called(message):
 
 
 class SnapshotMessages:
-    """The three messages of a tick, reused from tick to tick."""
+    """The messages of a tick, reused from tick to tick; ``clutches`` is None where none are."""
 
-    def __init__(self, shafts, inputs, moments):
+    def __init__(self, mechanism):
+        shafts, moments, clutches = mechanism.shafts, mechanism.moments, mechanism.actuators
         n = len(shafts)
         self.joint_states = JointState(
             name=list(shafts), position=[0.0] * n, velocity=[0.0] * n, effort=[0.0] * n)
         self.internal_moments = JointState(name=list(moments), effort=[0.0] * len(moments))
+        self.clutches = JointState(
+            name=[clutch.name for clutch in clutches], position=[0.0] * len(clutches),
+            velocity=[0.0] * len(clutches), effort=[0.0] * len(clutches)) if clutches else None
         self.power_flow = Int8()
         self._no_torque = dict.fromkeys(shafts, 0.0)
-        self._inputs = inputs
+        self._inputs = mechanism.inputs
+        self._carrier = shafts.index('carrier')
+        self._clutched = tuple(map(shafts.index, mechanism.clutches))
 
     def fill(self, snapshot, seconds, nanoseconds):
         """Put a snapshot and one stamp into the messages, in place."""
@@ -59,4 +65,15 @@ class SnapshotMessages:
         moments.effort[:] = array('d', snapshot.moment)
         for stamp in (joints.header.stamp, moments.header.stamp):
             stamp.sec, stamp.nanosec = seconds, nanoseconds
+        if clutches := self.clutches:
+            clutches.position[:] = self._slip(snapshot.position)
+            clutches.velocity[:] = self._slip(snapshot.velocity)
+            clutches.effort[:] = array('d', snapshot.clutch_force)
+            stamp = clutches.header.stamp
+            stamp.sec, stamp.nanosec = seconds, nanoseconds
         self.power_flow.data = snapshot.power_flow
+
+    def _slip(self, values):
+        """Return how far the shafts with a clutch are ahead of the carrier."""
+        carrier = values[self._carrier]
+        return array('d', [values[i] - carrier for i in self._clutched])

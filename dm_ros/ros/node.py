@@ -41,11 +41,15 @@ SWITCH_INTERVAL = 1e-4   # s that the loop waits at most for a service to let go
 
 HELP = """\
 A vehicle differential in real time: torques in as topics, speeds and internal moments out.
+Where it has clutches (lsd_*) axial forces press them.
 
   in   ~/torque/<shaft>     std_msgs/Float64          N m, one shaft
-       ~/torques            sensor_msgs/JointState    N m as effort, any shafts by name
+       ~/clutch/<clutch>    std_msgs/Float64          N, axial force on one clutch
+       ~/torques            sensor_msgs/JointState    N m and N as effort, any shafts and
+                                                      clutches (<clutch>_clutch) by name
   out  ~/joint_states       sensor_msgs/JointState    all shafts: rad, rad/s, N m
        ~/internal_moments   sensor_msgs/JointState    N m as effort
+       ~/clutches           sensor_msgs/JointState    slip in rad and rad/s, force in N
        ~/power_flow         std_msgs/Int8             +1 direct, -1 reverse
        /diagnostics         diagnostic_msgs/DiagnosticArray
   srv  ~/reset ~/step       std_srvs/Trigger
@@ -98,9 +102,11 @@ class DifferentialNode(Node):
         self._diagnostics = Diagnostics(self)
         # the steady clock: a timer of the ROS clock stalls when system time steps back
         self.create_timer(1.0, self.diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        simulation = self.simulation
+        forces = f', forces on {", ".join(clutches)}' if (clutches := simulation.clutches) else ''
         self.get_logger().info(
-            f'{settings.variant} at {settings.rate:g} Hz, {settings.mode}, '
-            f'{settings.loss_law} law of losses, torques on {", ".join(self.simulation.inputs)}')
+            f'{settings.variant} at {settings.rate:g} Hz, {settings.mode}, {settings.loss_law} '
+            f'law of losses, torques on {", ".join(simulation.inputs)}{forces}')
 
     @property
     def simulation(self):
@@ -174,7 +180,7 @@ class DifferentialNode(Node):
     def lockstep_tick(self, message):
         """Advance one tick with a message and answer it, or refuse both."""
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        if self.plant.take(message.name, message.effort, '~/torques', stamp):
+        if self.plant.take(message.name, message.effort, '~/torques', stamp, sparse=True):
             self._advance()
 
     def _followed_tick(self):

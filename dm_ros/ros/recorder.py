@@ -22,7 +22,7 @@ class Recorder:
     """
     A recorder in a ROS context of its own; call ``poll`` more often than ``DEEP_QOS`` overflows.
 
-    A row is a tick: both messages with its stamp, and the power flow that was sent after them
+    A row is a tick: the messages with its stamp, and the power flow that was sent after them
     and before the joint states of the next tick.
     """
 
@@ -40,6 +40,8 @@ class Recorder:
                                                   callback_group=group)
         self._joint_states = subscribe(JointState, f'{node}/joint_states')
         self._internal_moments = subscribe(JointState, f'{node}/internal_moments')
+        self._clutches = (subscribe(JointState, f'{node}/clutches')
+                          if self._mechanism.actuators else None)
         self._power_flow = subscribe(Int8, f'{node}/power_flow')
         self._diagnostics = subscribe(DiagnosticArray, '/diagnostics')
         self.loaded = False      # has any shaft had a torque?
@@ -57,6 +59,7 @@ class Recorder:
     def clear(self):
         """Forget what was recorded."""
         self._joints, self._moments, self._flows = [], {}, []
+        self._forces = {}
         self._missed_before = self._missed
 
     def poll(self):
@@ -67,6 +70,8 @@ class Recorder:
             self.loaded = self.loaded or any(message.effort)
         for message, _ in poll(self._internal_moments):
             self._moments[stamp(message)] = message.effort
+        for message, _ in poll(self._clutches) if self._clutches else ():
+            self._forces[stamp(message)] = message.effort
         for message, info in poll(self._power_flow):
             self._flows.append((info['source_timestamp'], message.data))
         for message, _ in poll(self._diagnostics):
@@ -100,11 +105,13 @@ class Recorder:
         ends = [timestamp for timestamp, _ in self._joints[1:]] + [np.inf]
         for (timestamp, joints), end in zip(self._joints, ends):
             moments = self._moments.get(stamp(joints))
+            forces = self._forces.get(stamp(joints)) if self._clutches else ()
             flow = np.searchsorted(sent, timestamp)
-            if moments is not None and flow < len(sent) and sent[flow] < end:
+            if None not in (moments, forces) and flow < len(sent) and sent[flow] < end:
                 sec, nanosec = stamp(joints)
                 yield (sec + nanosec * 1e-9, *joints.velocity, *joints.position,
-                       *(joints.effort[i] for i in inputs), *moments, self._flows[flow][1])
+                       *(joints.effort[i] for i in inputs), *moments, self._flows[flow][1],
+                       *forces)
 
 
 def stamp(message):

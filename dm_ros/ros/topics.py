@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The topics of a node: torques in, speeds and moments out."""
+"""The topics of a node: torques and forces in, speeds and moments out."""
 
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -30,9 +30,13 @@ class Inputs:
         def subscription(message_type, topic, qos):
             return node.create_subscription(message_type, topic, never_called, qos,
                                             callback_group=polled)
-        self._shafts = [] if plant.lockstep else [
-            (f'~/torque/{shaft}', shaft, subscription(Float64, f'~/torque/{shaft}', LATEST_QOS))
-            for shaft in plant.simulation.inputs]
+        mechanism = plant.simulation.mechanism
+        topics = {f'~/torque/{shaft}': shaft for shaft in mechanism.inputs}
+        topics.update((f'~/clutch/{clutch}', actuator.name)
+                      for clutch, actuator in zip(mechanism.clutches, mechanism.actuators))
+        self._single = [] if plant.lockstep else [
+            (topic, port, subscription(Float64, topic, LATEST_QOS))
+            for topic, port in topics.items()]
         self.torques = subscription(JointState, '~/torques',
                                     LOCKSTEP_INPUT_QOS if plant.lockstep else SHARED_QOS)
         if plant.lockstep:   # in real time publishers of all kinds are heard
@@ -40,11 +44,11 @@ class Inputs:
 
     def take(self):
         """Let the plant take what came since the last tick."""
-        for topic, shaft, subscription in self._shafts:
+        for topic, port, subscription in self._single:
             for message, _ in poll(subscription):
-                self._plant.take((shaft,), (message.data,), topic)
+                self._plant.take((port,), (message.data,), topic)
         for message, _ in poll(self.torques):
-            self._plant.take(message.name, message.effort, '~/torques')
+            self._plant.take(message.name, message.effort, '~/torques', sparse=True)
 
     def discard(self):
         """Drop all waiting messages on ``~/torques``; return their number."""
@@ -56,15 +60,16 @@ class Outputs:
 
     def __init__(self, node):
         self._node, plant = node, node.plant
-        simulation, settings = plant.simulation, plant.settings
+        mechanism, settings = plant.simulation.mechanism, plant.settings
         qos = LOCKSTEP_OUTPUT_QOS if plant.lockstep else OUTPUT_QOS
         self.joint_states = node.publisher(JointState, '~/joint_states', qos)
         self.internal_moments = node.publisher(JointState, '~/internal_moments', qos)
+        self.clutches = (
+            node.publisher(JointState, '~/clutches', qos) if mechanism.actuators else None)
         self.power_flow = node.publisher(Int8, '~/power_flow', qos)
         self.clock = node.publisher(Clock, '/clock', qos) if settings.publish_clock else None
         self._simulated_stamps = plant.lockstep or settings.publish_clock
-        self._messages = SnapshotMessages(
-            simulation.shafts, simulation.inputs, simulation.moments)
+        self._messages = SnapshotMessages(mechanism)
 
     def publish(self, snapshot, stamp=None):
         """
@@ -84,4 +89,6 @@ class Outputs:
             self.clock.publish(Clock(clock=messages.joint_states.header.stamp))
         self.joint_states.publish(messages.joint_states)
         self.internal_moments.publish(messages.internal_moments)
+        if self.clutches:
+            self.clutches.publish(messages.clutches)
         self.power_flow.publish(messages.power_flow)

@@ -14,11 +14,11 @@ from dm_ros.mechanism.parameters import SelfLockingParameters
 from dm_ros.mechanism.power_flow import DIRECT
 
 
-def sentence(p, torque, direction=DIRECT):
+def sentence(p, torque, direction=DIRECT, forces=(0.0, 0.0)):
     """Return one line on the limits at a carrier torque in N m, or at a large one, infinite."""
     words = 'a large torque' if math.isinf(torque) else f'{torque:g} N m'
     limits = []
-    for side in zip(*(split.share for split in torque_bias(p, torque, direction))):
+    for side in zip(*(split.share for split in torque_bias(p, torque, direction, forces))):
         limits.append('{:.1f} % to {:.1f} %'.format(*sorted(100 * share for share in side)))
     front, rear = limits
     if direction == DIRECT:
@@ -38,6 +38,9 @@ def parser():
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
     result.add_argument('--torque', type=float, default=300.0, metavar='N',
                         help='torque on the carrier, N m; default: %(default)g')
+    result.add_argument('--forces', type=float, nargs=2, default=(0.0, 0.0),
+                        metavar=('FRONT', 'REAR'),
+                        help='forces of the actuators on the clutches, N; default: none')
     result.add_argument('--reverse', action='store_true',
                         help='for driving output shafts and a braking carrier')
     return result
@@ -50,8 +53,12 @@ def run(arguments):
     if not 0.0 < arguments.torque < math.inf:
         raise ValueError(f'--torque: {arguments.torque!r} is not allowed, '
                          'it must be a number of N m above 0')
+    for force in arguments.forces:
+        if not 0.0 <= force < math.inf:
+            raise ValueError(f'--forces: {force!r} is not allowed, it must be a number of N, '
+                             'at least 0')
     for torque in (arguments.torque, math.inf):
-        print(sentence(p, torque, -DIRECT if arguments.reverse else DIRECT))
+        print(sentence(p, torque, -DIRECT if arguments.reverse else DIRECT, arguments.forces))
 
 
 def main(args=None):

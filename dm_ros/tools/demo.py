@@ -125,7 +125,7 @@ def report(record, missed, rate):
         f'reverse {100 * (flow < 0).mean():.0f} %',
         '',
         f'{"":24}{"lowest":>12}{"highest":>12}']
-    units = {'velocity': 'rad/s', 'moment': 'N m', 'torque': 'N m'}
+    units = {'velocity': 'rad/s', 'moment': 'N m', 'torque': 'N m', 'clutch_force': 'N'}
     for name, values in record.columns.items():
         kind, _, what = name.partition('.')
         if kind in units:

@@ -22,10 +22,10 @@ from dm_ros.tools.progress import progress
 
 EPILOG = """\
 FILE is a CSV as `simulate` reads it: a header "time,<shaft>,..." with every input shaft, and a
-row's torques hold until the time of the next row, those of the last row beyond it. Without
---duration the last time ends the playing. Torques go to the topic <node>/torques, in one message
-for all input shafts. At the end, and on Ctrl-C or SIGTERM as well, zero torques are published so
-that no load stays behind.
+row's torques hold until the time of the next row, those of the last row beyond it. Forces on
+clutches, in columns <clutch>_clutch, are played where FILE has any. Without --duration the last
+time ends the playing. All goes to the topic <node>/torques, in one message. At the end, and on
+Ctrl-C or SIGTERM as well, zeros are published so that no load stays behind.
 """
 
 
@@ -65,14 +65,14 @@ def _positive(text):
 
 
 class Player:
-    """Publishes torques to a node's topic ``torques``."""
+    """Publishes torques, and forces on clutches, to a node's topic ``torques``."""
 
-    def __init__(self, node, target, inputs):
+    def __init__(self, node, target, names):
         self._node = node
         reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
         topic = f'{target.rstrip("/")}/torques'
         self._publisher = node.create_publisher(JointState, topic, reliable)
-        self._message = JointState(name=list(inputs), effort=[0.0] * len(inputs))
+        self._message = JointState(name=list(names), effort=[0.0] * len(names))
 
     def wait(self, seconds):
         """Wait for a subscriber, at most so long, and tell how it went."""
@@ -88,7 +88,7 @@ class Player:
         log.info(f'playing to {topic}')
 
     def publish(self, torques):
-        """Publish one set of torques, N m, in the order of the inputs."""
+        """Publish one set of torques, N m, and forces, N, in the order of the names."""
         self._message.header.stamp = self._node.get_clock().now().to_msg()
         for index, torque in enumerate(torques):
             self._message.effort[index] = float(torque)
@@ -118,22 +118,26 @@ class Player:
 
 def load(arguments):
     """
-    Return what to play: names of the inputs, a function of n, the number of messages or None.
+    Return what to play: names, a function of n, the number of messages or None.
 
     :raises ValueError: for a CSV that is not as it should be.
     """
     rate, count = arguments.rate, None
     mechanism = (MECHANISMS[arguments.profile] if arguments.profile
                  else variant_named(arguments.variant).mechanism)
+    names = mechanism.inputs
     if arguments.torques:
-        held = read_torque_file(arguments.torques, mechanism.inputs).held(1 / rate)
+        held = read_torque_file(arguments.torques, mechanism.inputs,
+                                mechanism.clutch_moments).held(1 / rate)
         torques_at, count = held.at, len(held)
+        if len(torques_at(0)) > len(names):
+            names += mechanism.clutch_moments
     else:
         def torques_at(n):
             return mechanism.load(n / rate)
     if arguments.duration:
         count = max(1, round(arguments.duration * rate))
-    return mechanism.inputs, torques_at, count
+    return names, torques_at, count
 
 
 def run(args):
@@ -141,10 +145,10 @@ def run(args):
     player = None
     try:
         arguments = parser().parse_args(remove_ros_args(args)[1:])
-        inputs, torques_at, count = load(arguments)
+        names, torques_at, count = load(arguments)
         # rclpy's own handlers would shut down before the zero torques are out
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        player = Player(rclpy.create_node('play_torques'), arguments.node, inputs)
+        player = Player(rclpy.create_node('play_torques'), arguments.node, names)
         player.wait(arguments.wait)
         player.play(torques_at, arguments.rate, count)
     finally:

@@ -21,19 +21,21 @@ from dm_ros.files.record import Record
 from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
+from dm_ros.motion.simulation import NO_FORCE
 from dm_ros.settings import make_simulation, NodeParameters
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
 IN.csv has a header "time,<shaft>,..." with every input shaft of the variant, in any order
-(symmetric: pinion, left, right; lsd: carrier, front, rear), then rows of s and N m. A row's
-torques hold until the time of the next row; before the first row they are zero; the time of the
-last row ends the run, which begins at time 0. Each tick takes the torques in force at its start;
-a time less than 1/1000 of a tick after that start counts as on it.
+(symmetric: pinion, left, right; lsd: carrier, front, rear), then rows of s and N m. Columns
+<clutch>_clutch may be added, forces on the clutches in N (lsd: front_clutch, rear_clutch). A row's
+torques and forces hold until the time of the next row; before the first row they are zero; the
+time of the last row ends the run, which begins at time 0. Each tick takes what is in force at its
+start; a time less than 1/1000 of a tick after that start counts as on it.
 
 OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), torque.<input>
-(N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse): a row for the start, then one for
-the end of each tick. Without --out and --plot it goes to stdout.
+(N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse), clutch_force.<clutch> (N): a row
+for the start, then one for the end of each tick. Without --out and --plot it goes to stdout.
 
 Of FILE, a ROS 2 parameter file, these count: the parameters of the mechanism, loss_law, rate,
 substeps, power_flow_deadband and initial_velocity.
@@ -62,8 +64,9 @@ def parser():
 def rows_of(simulation, torques):
     """Run a simulation; yield the start and the end of each tick as rows of a record."""
     yield as_row(simulation.snapshot())
-    for torque in progress(torques, total=len(torques)):
-        yield as_row(simulation.step(torque))
+    count = len(simulation.inputs)
+    for row in progress(torques, total=len(torques)):
+        yield as_row(simulation.step(row[:count], row[count:] or NO_FORCE))
 
 
 def kept(rows, numbers):
@@ -85,7 +88,8 @@ def run(arguments):
     if arguments.loss_law:
         values['loss_law'] = arguments.loss_law
     simulation = make_simulation(arguments.variant, values, arguments.dt)
-    table = read_torque_file(arguments.torques, simulation.inputs)
+    table = read_torque_file(arguments.torques, simulation.inputs,
+                             simulation.mechanism.clutch_moments)
     try:
         torques = table.held(simulation.dt)
     except ValueError as error:

@@ -114,7 +114,7 @@ def test_a_refused_message_is_no_tick(ros):
     node = ros.differential('lsd_ode', mode='lockstep')
     joints = ros.listen(JointState, '/differential/joint_states')
     publisher = ros.publisher(JointState, '/differential/torques')
-    publisher.publish(torques(1, float('nan'), names=['front', 'rear']))
+    publisher.publish(torques(1, float('inf'), names=['front', 'rear']))
     publisher.publish(torques(7, names=['front']))
     ros.until(lambda: joints)
     assert list(joints[0].effort) == [0.0, 7.0, 0.0, 0.0]

@@ -106,7 +106,7 @@ def test_two_controllers_share_the_torques_topic_within_a_tick(ros):
 
 
 @pytest.mark.parametrize('names, efforts, why', [
-    (['pinion', 'left'], [5.0, math.nan], 'nan'),
+    (['pinion', 'left'], [5.0, math.inf], 'inf'),
     (['pinion', 'left'], [5.0, -math.inf], 'inf'),
     (['pinion', 'wheel'], [5.0, 5.0], 'wheel'),
     (['pinion', 'pinion'], [5.0, 5.0], 'twice'),

@@ -86,7 +86,7 @@ def exact_self_locking(p, torques, dt, start=(0.0, 0.0), deadband=0.0, tick=lamb
     """
     phi, preload = clutched.full_friction(p)
     friction = preload
-    coefficients = {d: clutched.coefficients(p, SelfLockingOde(p).response(d), not frozen)
+    coefficients = {d: clutched.coefficients(p, SelfLockingOde(p).response(d), not frozen, d)
                     for d in (DIRECT, REVERSE)}
     a_1, a_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)   # omega_1 = w + a_1 s, 2 = w - a_2 s
     w, s = a_2 * start[0] + a_1 * start[1], start[0] - start[1]
