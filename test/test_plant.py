@@ -92,11 +92,15 @@ def test_an_unknown_law_is_refused_and_named(log):
         Plant({'loss_law': 'torsen'}, log)
 
 
-def test_a_tick_out_of_range_is_refused_and_counted_and_the_state_stays(log):
-    shafts = Simulation('symmetric_ode').shafts
-    plant = Plant({'torque_limit': 1e9, 'loss_law': 'paper',
-                   **{f'symmetric.inertia.{shaft}': 1e-302 for shaft in shafts},
-                   **{f'symmetric.viscosity.{shaft}': 0.0 for shaft in shafts}}, log)
+def test_a_tick_out_of_range_is_refused_and_counted_and_the_state_stays(log, monkeypatch):
+    plant = Plant({'torque_limit': 1e9}, log)
+    advance = plant.simulation.advance
+
+    def bounded(torques, *forces):
+        if max(map(abs, torques)) > 1e8:
+            raise ValueError('out of the range of floating point numbers')
+        return advance(torques, *forces)
+    monkeypatch.setattr(plant.simulation, 'advance', bounded)
     before = plant.tick()
     assert plant.take(('pinion',), (1e9,), 'test')
     assert plant.tick() == before

@@ -46,6 +46,11 @@ def test_a_last_resort_without_a_solution_in_one_step_takes_several():
     Tally('passive').run(62_148)
 
 
+def test_a_last_resort_follows_an_output_that_is_held():
+    # along omega_1 = 0 both speeds change by 1e7 rad/s^2, and roots one by one find no end of it
+    Tally('passive').run(59_828)
+
+
 def test_a_last_resort_finds_rest_where_it_is_nearer_than_numbers_are():
     Tally('passive').run(78_717)
 

@@ -50,7 +50,7 @@ def proportional_friction(p):
 
 
 def pressing(p, M_1, M_2):
-    """Return ``|M_k|``, less the coast factor where the shaft drives; M in one sign for all flows."""
+    """Return ``|M_k|``, less the coast factor where the shaft drives; M as it is reported."""
     return (M_1 if M_1 >= 0.0 else -M_1 * p.c_1), (M_2 if M_2 >= 0.0 else -M_2 * p.c_2)
 
 

@@ -32,7 +32,8 @@ from dm_ros.motion.exponentials import apply_phi_2
 TOLERANCE = 1e-4        # rad/s, error estimate allowed in one part
 BACKWARD = 3.0          # times that, for the estimate seen from the end
 SAFETY, SHRINK, GROW = 0.8, 0.1, 5.0
-MOST_RESORTS = 100      # steps of the last resort, which is halved where it finds no solution
+NEWTON = 30             # steps of Newton's method
+MOST_RESORTS = 1000     # steps of the last resort, which is halved where it finds no solution
 
 
 class Law(NamedTuple):
@@ -118,15 +119,45 @@ def backward_euler(law, k, u, y, J, h):
     return (w_end, slip), (h * (w + w_end) / 2, h * (s + slip) / 2)
 
 
+def newton(law, k, u, y, h):
+    """Return y_end = y + h f(y_end) by Newton's method from y, None where it does not converge."""
+    w, s = w_0, s_0 = y
+    try:
+        for _ in range(NEWTON):
+            point = law.evaluate(k, u, w, s)
+            (J_ww, J_ws, J_sw, J_ss), _ = law.jacobian(k, u, point)
+            r_w, r_s = w - w_0 - h * point[0], s - s_0 - h * point[1]
+            a, b, c, d = 1 - h * J_ww, -h * J_ws, -h * J_sw, 1 - h * J_ss
+            det = a * d - b * c
+            d_w, d_s = (d * r_w - b * r_s) / det, (a * r_s - c * r_w) / det
+            w, s = w - d_w, s - d_s
+            if abs(d_w) + abs(d_s) <= 1e-12 * (abs(w) + abs(s)) + 1e-12:
+                return (w, s) if solved(law, k, u, y, (w, s), h) else None
+    except ArithmeticError:
+        pass
+    return None
+
+
+def solved(law, k, u, y, end, h):
+    """Return whether y_end = y + h f(y_end), but for what a root leaves where f is steep."""
+    d_w, d_s = end[0] - y[0], end[1] - y[1]
+    f_w, f_s, *_ = law.evaluate(k, u, *end)
+    return abs(d_w - h * f_w) + abs(d_s - h * f_s) <= 1e-4 + 1e-6 * (abs(d_w) + abs(d_s))
+
+
 def implicit_euler(law, k, u, y, J, h):
     """
     Return y and its integral after a step that makes no energy, None where none is found.
 
     y_end = y + h f(y_end), and h y_end is the integral: all losses are then those at y_end, so
-    the energy grows by less than the work. The slip is sought by a bracketed root, and for each
-    slip the carrier speed by another.
+    the energy grows by less than the work. It is sought by Newton's method. Where that finds no
+    end, the slip is sought by a bracketed root, and for each slip the carrier speed by another.
     """
     w_0, s_0 = y
+    end = newton(law, k, u, y, h)
+    if end:
+        w, s = end
+        return end, (h * w, h * s)
 
     def found(residual, start):
         at = root(residual, start, -residual(start))
@@ -142,12 +173,8 @@ def implicit_euler(law, k, u, y, J, h):
         w = carrier(s)
     except ArithmeticError:
         return None
-    d_w, d_s = w - w_0, s - s_0
-    f_w, f_s, *_ = law.evaluate(k, u, w, s)
-    # a jump is no root; and where f is steep a root leaves a little
-    if abs(d_w - h * f_w) + abs(d_s - h * f_s) > 1e-4 + 1e-6 * (abs(d_w) + abs(d_s)):
-        return None
-    return (w, s), (h * w, h * s)
+    # a jump is no root
+    return ((w, s), (h * w, h * s)) if solved(law, k, u, y, (w, s), h) else None
 
 
 PAPER = Law(clutched.evaluate, clutched.jacobian, backward_euler, 200, 1e-6, lambda *_: True)
