@@ -28,6 +28,8 @@ import time
 
 import numpy as np
 
+from dm_ros.mechanism.variants import variant_named
+
 C_LOOP = r"""
 #include <stdio.h>
 #include <stdlib.h>
@@ -248,14 +250,12 @@ def run_rate(rate, arguments, folder, c_loop, beside=None):
         return children[-1]
     length = arguments.duration + arguments.warm_up
     child(*me, 'node', rate, arguments.variant, folder / 'node')
-    input_shaft, output_shaft = (
-        ('pinion', 'left') if arguments.variant.startswith('symmetric') else ('carrier', 'front'))
+    mechanism = variant_named(arguments.variant).mechanism
+    input_shaft, output_shaft, flooded = mechanism.inputs
     child(*me, 'publisher', rate, input_shaft)
     child(*me, 'round_trips', output_shaft, 1, folder / 'trips')
-    mechanism, flooded = (('symmetric', 'right') if input_shaft == 'pinion'
-                          else ('lsd', 'rear'))
     if beside == 'setter':
-        child(*me, 'setter', f'{mechanism}.inertia.carrier')
+        child(*me, 'setter', f'{mechanism.name}.inertia.carrier')
     if beside == 'flood':
         child(*me, 'publisher', FLOOD, flooded)
     time.sleep(arguments.settle)

@@ -93,7 +93,7 @@ def passive_trajectory(p, load, dt, lagged=False):
                       mxstep=100_000)[-1].tolist()
         if lagged:
             _, _, _, _, M_1, M_2, *_ = passive.evaluate(k, u, w, s)
-            friction = phi[0] * abs(M_1) + S[0], phi[1] * abs(M_2) + S[1]
+            friction = clutched.held_friction(p, phi, S, clutched.pressing(p, M_1, M_2), ())
         rows.append((w, s))
         index.append(direction)
     return Trajectory(three_shafts(p, *np.array(rows).T), None, np.array(index))

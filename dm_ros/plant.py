@@ -172,10 +172,7 @@ class Plant:
             simulation.adopt(prepared.model)
         simulation.power_flow_deadband = settings.deadband
         simulation.initial_velocity = settings.initial_velocity(simulation.outputs)
-        values, mechanism = simulation.parameters.named(), simulation.mechanism
-        self.inputs.limits = (settings.torque_limit,) * self._shafts + tuple(
-            values[f'{mechanism.name}.clutch.{clutch}.actuator_limit']
-            for clutch in simulation.clutches)
+        self.inputs.limits = (settings.torque_limit,) * self._shafts + simulation.force_limits
         # in lockstep time stands still without torques, so none is too old
         self.inputs.timeout = 0.0 if self.lockstep else settings.torque_timeout * settings.rate
 

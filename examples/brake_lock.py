@@ -17,11 +17,10 @@ from pathlib import Path
 import sys
 from typing import NamedTuple
 
-from car import BrakeLock, Car, CarParameters, with_wheels_and_engine
+from car import BrakeLock, Car, CarParameters, final_drive_ratio, with_wheels_and_engine
 import numpy as np
 
 from dm_ros.files.record import Record
-from dm_ros.mechanism.parameters import SymmetricParameters
 from dm_ros.testing import DirectDifferential, LockstepDifferential
 
 RATE = 1000.0   # Hz
@@ -58,8 +57,7 @@ def parameters_of(case, p=None):
 
 def make_car(case, rate=RATE, p=None):
     """Return the ``Car`` of a case."""
-    symmetric = case.variant.startswith('symmetric')
-    return Car(1.0 / rate, p, 1.0 if symmetric else SymmetricParameters().g_F)
+    return Car(1.0 / rate, p, final_drive_ratio(case.variant))
 
 
 def attach(differential, case, rate=RATE, p=None):

@@ -12,7 +12,8 @@ front-driven middle-class car in first gear.
 from dataclasses import dataclass
 import math
 
-from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.parameters import SymmetricParameters
+from dm_ros.mechanism.variants import SYMMETRIC, variant_named
 
 ASPHALT, ICE = 0.95, 0.12   # greatest friction coefficients of a tyre
 GRAVITY = 9.81              # m/s^2
@@ -47,15 +48,17 @@ def with_wheels_and_engine(variant, p):
 
     This is what keeps the exchange of torques stable, see doc/coupling.md.
     """
-    if variant.startswith('symmetric'):
-        gear = SymmetricParameters()
-        return {'symmetric.inertia.left': gear.I_1 + p.wheel_inertia,
-                'symmetric.inertia.right': gear.I_2 + p.wheel_inertia,
-                'symmetric.inertia.pinion': gear.I_3 + p.engine_inertia}
-    gear = SelfLockingParameters()
-    return {'lsd.inertia.front': gear.I_1 + p.wheel_inertia,
-            'lsd.inertia.rear': gear.I_2 + p.wheel_inertia,
-            'lsd.inertia.carrier': gear.I_0 + p.engine_inertia * SymmetricParameters().g_F**2}
+    mechanism = variant_named(variant).mechanism
+    own, (driven, *wheels) = mechanism.parameters().named(), mechanism.inputs
+    attached = {driven: p.engine_inertia * final_drive_ratio(variant)**2,
+                **dict.fromkeys(wheels, p.wheel_inertia)}
+    return {(name := f'{mechanism.name}.inertia.{shaft}'): own[name] + inertia
+            for shaft, inertia in attached.items()}
+
+
+def final_drive_ratio(variant):
+    """Return the ratio between engine and driven shaft; the symmetric differential has its own."""
+    return 1.0 if variant_named(variant).mechanism is SYMMETRIC else SymmetricParameters().g_F
 
 
 class Car:

@@ -16,11 +16,11 @@ from car import CarParameters, with_wheels_and_engine
 import numpy as np
 
 from dm_ros import Simulation
-from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.parameters import SymmetricParameters
+from dm_ros.mechanism.variants import variant_named
 from dm_ros.testing import DirectDifferential
 
 GEAR = SymmetricParameters()
-LSD = SelfLockingParameters()
 PUSH = (0.011, -0.009)   # rad/s
 TICKS = 800
 CAR = CarParameters()
@@ -153,7 +153,7 @@ def tables():
                    f'| {slope_limit(rate, attached(inertia)):.4g} |')
     yield from ('', '| at 1000 Hz | formula, N m s/rad | measured |', '|---|---|---|')
     for name, variant, changes, shafts in CARS:
-        parameters = (GEAR if variant.startswith('symmetric') else LSD).changed(changes)
+        parameters = variant_named(variant).mechanism.parameters().changed(changes)
         yield (f'| {name} | {slope_formula(1000.0, parameters, shafts):.4g} '
                f'| {slope_limit(1000.0, parameters, shafts, variant=variant):.4g} |')
     yield from ('', '| substeps, at 1000 Hz and 1 kg m^2 | measured limit, N m s/rad |',

@@ -9,7 +9,7 @@ import pytest
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.energy import Energy
-from dm_ros.mechanism.variants import SYMMETRIC
+from dm_ros.mechanism.variants import SYMMETRIC, variant_named
 from dm_ros.motion.energy import given_back, Layout
 from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.plant import Condition, Plant
@@ -60,7 +60,7 @@ def in_force(plant):
 @pytest.mark.parametrize('audited', [True, False])
 @pytest.mark.parametrize('loss_law', LOSS_LAWS)
 def test_it_moves_as_the_simulation_bit_for_bit(variant, audited, loss_law, log):
-    mechanism = variant.split('_')[0]
+    mechanism = variant_named(variant).mechanism.name
     outputs = NAMES[mechanism][1:]
     plant = Plant({
         'variant': variant, 'rate': 500.0, 'energy_audit': audited, 'loss_law': loss_law,
@@ -278,7 +278,7 @@ def test_a_mechanism_without_actuators_knows_no_forces(log):
 
 @pytest.mark.parametrize('variant', VARIANTS)
 def test_after_a_reset_a_run_repeats_bit_for_bit(variant, log):
-    plant, names = Plant({'variant': variant}, log), NAMES[variant.split('_')[0]]
+    plant, names = Plant({'variant': variant}, log), NAMES[variant_named(variant).mechanism.name]
 
     def run():
         result = []
@@ -384,7 +384,7 @@ def test_conditions_of_a_plant_begin_and_end_once(log):
 
 def cruise(variant, loss_law, log, seconds=4):
     """Return a ``Plant`` after a governor held 20 rad/s against 100 N m on each wheel."""
-    mechanism = variant.split('_')[0]
+    mechanism = variant_named(variant).mechanism.name
     names, outputs = NAMES[mechanism], NAMES[mechanism][1:]
     plant = Plant({'variant': variant, 'rate': 1000.0, 'loss_law': loss_law,
                    'torque_timeout': 0.0,
@@ -431,7 +431,7 @@ def test_a_governed_cruise_under_the_passive_law_never_warns(variant, log):
 
 @pytest.mark.parametrize('variant', VARIANTS)
 def test_whatever_the_load_the_passive_law_never_warns(variant, log):
-    plant, names = Plant({'variant': variant}, log), NAMES[variant.split('_')[0]]
+    plant, names = Plant({'variant': variant}, log), NAMES[variant_named(variant).mechanism.name]
     for n in range(500):
         plant.take(names, load(7 * n), 'test')
         plant.tick()

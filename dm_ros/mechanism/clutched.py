@@ -60,6 +60,21 @@ def actuated(p, preload, forces):
     return S_1 + f_1 * A_1 * p.R_1, S_2 + f_2 * A_2 * p.R_2
 
 
+def held_friction(p, lagged, preload, memory, forces):
+    """
+    Return the friction at full slip that does not follow M in a step, (2,), N m.
+
+    :param lagged: None, or phi of variant 1: with ``|M|`` of the preceding step, the memory, the
+        whole friction is of that kind.
+    :param preload: its friction, N m; forces: of the actuators, N.
+    """
+    S = actuated(p, preload, forces) if any(forces) else preload
+    if lagged is None:
+        return S
+    (phi_1, phi_2), (M_1, M_2), (S_1, S_2) = lagged, memory, S
+    return phi_1 * M_1 + S_1, phi_2 * M_2 + S_2
+
+
 @dataclass(frozen=True, slots=True)
 class Coefficients:
     """What does not change while parameters, direction and step length stay."""

@@ -154,12 +154,8 @@ class SelfLockingModel:
 
     def friction(self, memory, forces):
         """Return S, see the module, N m, under axial forces on the clutches, N."""
-        S_1, S_2 = clutched.actuated(self.parameters, self._preload, forces)
-        if not self.lagged:
-            return S_1, S_2
-        # variant 1: with |M| of the preceding step the whole friction is of that kind
-        (phi_1, phi_2), (M_1, M_2) = self._phi, memory
-        return phi_1 * M_1 + S_1, phi_2 * M_2 + S_2
+        return clutched.held_friction(
+            self.parameters, self._phi if self.lagged else None, self._preload, memory, forces)
 
 
 class PassiveModel:
@@ -222,13 +218,8 @@ class PassiveModel:
 
     def friction(self, memory, forces):
         """Return S, see the module, N m, under axial forces on the clutches, N."""
-        if not self._clutches:
-            return self._preload
-        S_1, S_2 = clutched.actuated(self.parameters, self._preload, forces)
-        if not self.lagged:
-            return S_1, S_2
-        (phi_1, phi_2), (M_1, M_2) = self._phi, memory
-        return phi_1 * M_1 + S_1, phi_2 * M_2 + S_2
+        return clutched.held_friction(
+            self.parameters, self._phi if self.lagged else None, self._preload, memory, forces)
 
 
 class PassiveSymmetricModel(PassiveModel):

@@ -12,6 +12,7 @@ from operator import add
 
 from dm_ros.mechanism.power_flow import DIRECT
 from dm_ros.mechanism.variants import variant_named
+from dm_ros.motion.actuators import actuators_of
 from dm_ros.motion.models import LOSS_LAWS, model_of, PASSIVE
 from dm_ros.motion.state import Snapshot, State
 
@@ -77,6 +78,11 @@ class Simulation:
         return self.mechanism.clutches
 
     @property
+    def force_limits(self):
+        """Largest force on each clutch, N; larger commands are clamped to it."""
+        return tuple([actuator.limit for actuator in self._actuators])
+
+    @property
     def moments(self):
         """Names of the internal moments."""
         return self.mechanism.moments
@@ -93,7 +99,7 @@ class Simulation:
 
     @property
     def coarse_steps(self):
-        """Solver steps since the start that reached the bound of work, see ``clutch``."""
+        """Solver steps since the start that reached the bound of work, see ``adaptive``."""
         return self._coarse_steps
 
     @property
@@ -285,26 +291,14 @@ class Simulation:
             return self._force
         ports = self.mechanism.actuators
         if not ports:
-            if tuple(commands) not in ((), NO_FORCE):
+            # a numpy array is no tuple
+            if not hasattr(commands, '__iter__') or tuple(commands) not in ((), NO_FORCE):
                 raise ValueError(f'clutch_forces: {commands!r} is not allowed, there is no clutch')
             return ()
         A = numbers_for('clutch_forces', commands, ports)
         refuse('clutch_forces', A, ports)
-        return tuple([rise_to(before, min(command, limit), rise) for before, command, (limit, rise)
-                      in zip(self._force, A, self._actuators)])
-
-
-def actuators_of(p, clutches, dt):
-    """Return ``(limit, rise)`` of each clutch: the share of the way to it that a tick takes."""
-    if not clutches:
-        return ()
-    return tuple([(limit, 1.0 if not tau else -math.expm1(-dt / tau))
-                  for limit, tau in ((p.A_1, p.tau_1), (p.A_2, p.tau_2))])
-
-
-def rise_to(before, command, rise):
-    """Return a force after a tick of its lag; the command itself without any."""
-    return command if rise == 1.0 else before + (command - before) * rise
+        return tuple([actuator.follow(force, command) for actuator, force, command
+                      in zip(self._actuators, self._force, A)])
 
 
 def numbers_for(what, values, ports):

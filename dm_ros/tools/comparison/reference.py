@@ -97,7 +97,7 @@ def exact_self_locking(p, torques, dt, start=(0.0, 0.0), deadband=0.0, tick=lamb
         direction = power_flow(
             T[0] * w, T[1] * (w + a_1 * s) + T[2] * (w - a_2 * s), deadband, direction)
         if frozen:
-            friction = phi[0] * abs(M_1) + preload[0], phi[1] * abs(M_2) + preload[1]
+            friction = clutched.held_friction(p, phi, preload, (M_1, M_2), ())
         k = coefficients[direction]
         u = clutched.held(k, T, friction)
 
@@ -110,9 +110,10 @@ def exact_self_locking(p, torques, dt, start=(0.0, 0.0), deadband=0.0, tick=lamb
             raise ValueError('lsd: LSODA finds no exact solution to compare with, after '
                              f'{len(index) * dt:g} s')
         w, s = y[-1].tolist()
-        _, _, F_1, F_2, M_1, M_2, *_ = clutched.evaluate(k, u, w, s)
+        _, _, F_1, F_2, *M, _, _, _, _ = clutched.evaluate(k, u, w, s)
         states.append((w, w + a_1 * s, w - a_2 * s))
-        moments.append((direction * M_1, direction * M_2, F_1, F_2))
+        moments.append((direction * M[0], direction * M[1], F_1, F_2))
+        M_1, M_2 = clutched.pressing(p, direction * M[0], direction * M[1])
         index.append(direction)
         tick()
     return Exact(np.array(states), np.array(moments), np.array(index))
