@@ -220,8 +220,9 @@ def test_a_differential_without_clutches_takes_no_force():
     simulation = Simulation('symmetric_ode')
     for none in ((), (0.0, 0.0), [0, 0]):
         assert simulation.clutches == () == simulation.step((1.0, 0.0, 0.0), none).clutch_force
-    with pytest.raises(ValueError, match='clutch_forces: .* there is no clutch'):
-        simulation.step((1.0, 0.0, 0.0), (5.0, 0.0))
+    for forces in ((5.0, 0.0), None, 5.0):
+        with pytest.raises(ValueError, match='clutch_forces: .* there is no clutch'):
+            simulation.step((1.0, 0.0, 0.0), forces)
 
 
 # Books

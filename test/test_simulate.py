@@ -160,6 +160,54 @@ def test_reads_what_spreadsheets_write(folder):
         (0.0, 1.0), ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
 
 
+FORCED = ('time,rear_clutch,carrier,front,rear\n0,0,300,-100,-150\n0.1,2000,300,-100,-150\n'
+          '0.2,500.5,30,-100,-15\n0.3,0,0,0,0\n')
+
+
+@pytest.mark.parametrize('variant', ['lsd_lagged', 'lsd_ode', 'lsd_dae'])
+def test_forces_on_clutches_are_read_from_their_columns(folder, variant):
+    (folder / 'IN.csv').write_text(FORCED)
+    (folder / 'lag.yaml').write_text(
+        '/**: {ros__parameters: {lsd.clutch.rear.actuator_time_constant: 0.01}}')
+    assert simulate('--out', 'OUT.csv', '--dt', '0.01', '--params', 'lag.yaml',
+                    variant=variant) == 0
+    simulation = Simulation(variant, 0.01, {'lsd.clutch.rear.actuator_time_constant': 0.01})
+    expected = [simulation.snapshot()] + [
+        simulation.step(torques, (0.0, force)) for torques, force in (
+            ((300, -100, -150), 0.0), ((300, -100, -150), 2000.0), ((30, -100, -15), 500.5))
+        for _ in range(10)]
+    rows = np.loadtxt('OUT.csv', delimiter=',', skiprows=1)
+    assert np.array_equal(rows, [np.hstack(snapshot) for snapshot in expected])
+    assert 1900.0 < table()['clutch_force.rear'].max() < 2000.0
+
+
+def test_a_file_without_forces_is_one_with_forces_of_zero(folder):
+    write_profile('lsd_ode', 1.0)
+    assert simulate('--out', 'a.csv', variant='lsd_ode') == 0
+    header, *rows = (folder / 'IN.csv').read_text().splitlines()
+    (folder / 'IN.csv').write_text('\n'.join(
+        [f'{header},front_clutch', *(f'{row},0' for row in rows)]))
+    assert simulate('--out', 'b.csv', variant='lsd_ode') == 0
+    assert (folder / 'a.csv').read_bytes() == (folder / 'b.csv').read_bytes()
+
+
+@pytest.mark.parametrize('message, change', [
+    ("IN.csv:3: column 'rear_clutch': -2000.0 N is negative", ('2000', '-2000')),
+    ("IN.csv:3: column 'rear_clutch': 'nan' is not a finite number", ('2000', 'nan')),
+    ("IN.csv:1: column 'left_clutch': unknown, the columns are time, carrier, front, rear, "
+     'front_clutch (if wanted)', ('rear_clutch', 'left_clutch')),
+    ("IN.csv:1: column 'front': missing", ('front,', 'front_clutch,'))])
+def test_a_column_of_forces_that_cannot_be_is_refused_by_line_and_column(
+        folder, capfd, message, change):
+    (folder / 'IN.csv').write_text(FORCED.replace(*change, 1))
+    refused(folder, capfd, message, '--out', 'OUT.csv', '--variant', 'lsd_ode')
+
+
+def test_a_clutch_that_is_not_there_has_no_column(folder, capfd):
+    (folder / 'IN.csv').write_text(GOOD.replace('right', 'right,left_clutch'))
+    refused(folder, capfd, "IN.csv:1: column 'left_clutch': unknown", '--out', 'OUT.csv')
+
+
 BAD_TABLES = {
     "IN.csv:1: column 'time': missing": '',
     "IN.csv:1: column 'right': missing": 'time,pinion,left\n0,1,2\n1,1,2\n',

@@ -7,7 +7,9 @@ PANELS = (   # kind of column, what it is called, unit
     ('velocity', 'speed', 'rad/s'),
     ('moment', 'internal moment', 'N m'),
     ('torque', 'torque', 'N m'),
+    ('clutch_force', 'clutch force', 'N'),   # only where there is any
 )
+HELD = 'torque', 'clutch force', 'power flow'
 FAST = ('pinion', 'satellite')   # they turn several times as fast: a panel of their own
 COLORS = {   # a shaft has one colour in all panels, and its moment as well
     'carrier': '#222222', 'pinion': '#2a8a3e', 'satellite': '#b8860b',
@@ -65,7 +67,8 @@ def _panels(columns):
             fast = {name: curves.pop(name) for name in FAST if name in curves}
             yield f'{title}, {unit}', curves
             curves = fast
-        yield f'{title}, {unit}', curves
+        if kind != 'clutch_force' or any(values.any() for values in curves.values()):
+            yield f'{title}, {unit}', curves
     yield 'power flow', {'power_flow': columns['power_flow']}
 
 
@@ -73,7 +76,7 @@ def _draw(ax, time, label, curves):
     ax.set_ylabel(label)
     ax.grid(alpha=0.25)
     ax.spines[['top', 'right']].set_visible(False)
-    held = 'torque' in label or label == 'power flow'   # from the preceding row's time on
+    held = label.startswith(HELD)   # from the preceding row's time on
     for name, values in curves.items():
         if held:
             ax.step(time, values, where='pre', color=COLORS.get(name), linewidth=1.1, label=name)

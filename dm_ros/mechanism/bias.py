@@ -54,7 +54,7 @@ def torque_bias(p, torque=math.inf, direction=DIRECT, forces=(0.0, 0.0)):
     :param direction: +1 for what a driving carrier gives to the shafts, -1 for what driving
         shafts give to a braking carrier.
     :param forces: axial forces of the actuators on both clutches, N.
-    :raises ValueError: where the torque cannot turn the shafts against the preload.
+    :raises ValueError: where the torque cannot turn the shafts against preload and forces.
     """
     if not torque > 0.0:
         raise ValueError(f'torque: {torque!r} is not allowed, it must be above 0 N m')
@@ -84,7 +84,8 @@ def _split(p, torque, direction, forces, sigma):
     split = (Split(*(eta_k * M_k - F_k for eta_k, M_k, F_k in zip(eta, M, F)))
              if direction == DIRECT else Split(*(M_k + F_k for M_k, F_k in zip(M, F))))
     if not split.front + split.rear > 0.0:
-        raise ValueError(f'torque: {torque:g} N m does not turn the shafts against the preload')
+        raise ValueError(
+            f'torque: {torque:g} N m does not turn the shafts against preload and forces')
     return split
 
 

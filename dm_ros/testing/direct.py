@@ -24,7 +24,7 @@ class DirectDifferential:
         Step until a condition or for a time, whichever comes first.
 
         :param law: function of the last ``Snapshot`` that returns the torques of the next tick,
-            N m, in the order of ``simulation.inputs``; or a tuple of these and of the axial forces
+            N m, in the order of ``simulation.inputs``; or a pair of these and of the axial forces
             on the clutches, N, in the order of ``simulation.clutches``.
         :param seconds: simulated time.
         :param until: function of a ``Snapshot``; true at the last tick.
@@ -35,7 +35,7 @@ class DirectDifferential:
             self.snapshots)
         while count is None or len(self.snapshots) - first < count:
             demand = law(snapshot)
-            with_forces = isinstance(demand, tuple) and len(demand) == 2
+            with_forces = isinstance(demand, (tuple, list)) and len(demand) == 2
             snapshot = step(*demand) if with_forces else step(demand)
             self.snapshots.append(snapshot)
             if until and until(snapshot):

@@ -34,7 +34,8 @@ def parser():
         'bias', description='Print how far the clutches of a self-locking differential can '
         'shift torque between front and rear, with a driving carrier and full slip.',
         epilog='The shares are of what both output shafts get together. Below some torque the '
-        'preload of the clutches turns one of them round: its share is negative then.')
+        'preload and the forces on the clutches turn one of them round: its share is negative '
+        'then. Beside a large torque neither counts.')
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
     result.add_argument('--torque', type=float, default=300.0, metavar='N',
                         help='torque on the carrier, N m; default: %(default)g')

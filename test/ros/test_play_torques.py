@@ -49,6 +49,20 @@ def test_plays_a_built_in_load_and_ends_with_zero(ros, play, arguments, profile,
     assert list(last.effort) == [0.0, 0.0, 0.0]
 
 
+def test_plays_forces_where_the_file_has_any_and_ends_with_open_clutches(ros, play, tmp_path):
+    file = tmp_path / 'torques.csv'
+    file.write_text('time,carrier,front,rear,rear_clutch\n0,30,-10,-15,500\n0.4,0,0,0,0\n')
+    messages = listen(ros)
+    process = play('--variant', 'lsd_ode', '--torques', file, '--wait', 60)
+    ros.until(lambda: process.returncode is not None)
+    ros.until(lambda: messages and not any(messages[-1].effort))
+    *played, last = messages
+    assert process.returncode == 0 and played
+    assert all(list(message.effort) == [30.0, -10.0, -15.0, 0.0, 500.0] for message in played)
+    assert last.name == ['carrier', 'front', 'rear', 'front_clutch', 'rear_clutch']
+    assert list(last.effort) == [0.0] * 5
+
+
 def test_plays_a_file_to_its_end(ros, play, tmp_path):
     rows = [(float(n), n + 0.25, n + 0.5) for n in range(1, 31)]   # pinion, left, right
     file = tmp_path / 'torques.csv'
