@@ -137,8 +137,8 @@ def agreeing(rng, symmetric, direction):
 @EACH_FORMULATION
 def test_where_all_powers_agree_it_is_the_law_of_the_paper(formulation, direction):
     symmetric = formulation in FORMULATIONS[:2]
-    rng = np.random.default_rng(1)
-    for _ in range(2000):
+    rng, states = np.random.default_rng(1), 0
+    while states < 2000:
         p, (w, s), T, flow = agreeing(rng, symmetric, direction)
         if formulation is SelfLockingLagged:   # the friction of a step before
             M = np.abs(rng.normal(0, 100, 2))
@@ -147,6 +147,7 @@ def test_where_all_powers_agree_it_is_the_law_of_the_paper(formulation, directio
             flow = PassiveFlow(p, T, friction)
             if flow.point(w, s)[7] != PassiveFlow(p, T).point(w, s)[7]:
                 continue
+        states += 1
         point = flow.point(w, s)
         if symmetric:
             r, outputs = formulation(p).response(direction), accelerations(flow.k, (w, s))[1:]
