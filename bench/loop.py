@@ -153,7 +153,11 @@ def publisher(rate, shaft):
         Float64, f'/differential/torque/{shaft}', 10).publish
     n, start = 0, time.monotonic()
     while rclpy.ok():
-        publish(Float64(data=float(n % 20 - 10)))
+        try:
+            publish(Float64(data=float(n % 20 - 10)))
+        except Exception:
+            if rclpy.ok():   # otherwise it is the shutdown that broke the call
+                raise
         n = max(n + 1, int((time.monotonic() - start) * rate))
         time.sleep(max(0.0, start + n / rate - time.monotonic()))
 
