@@ -3,7 +3,7 @@
 
 """Files that are whole or not there."""
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import os
 
 
@@ -21,16 +21,14 @@ def replacing(path, mode):
         return
     folder, name = os.path.split(os.path.realpath(path))
     unfinished = os.path.join(folder, f'.{name}.{os.getpid()}.part')
-    try:
-        file = open(unfinished, mode)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, path) from None
-    try:
-        with file:
+    try:   # from before it is there, since a signal may come at any moment
+        with open(unfinished, mode) as file:
             yield file
         os.replace(unfinished, os.path.join(folder, name))
     except BaseException as error:
-        os.unlink(unfinished)
-        if isinstance(error, OSError) and error.filename is None:   # as on a full disk
+        with suppress(OSError):
+            os.unlink(unfinished)
+        # of the user's file shall be told: none is named on a full disk, ours where none can be made
+        if isinstance(error, OSError) and error.filename in (None, unfinished):
             raise OSError(error.errno, error.strerror, path) from None
         raise
