@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The motion of a self-locking differential, clutches and all, as functions of plain floats.
+The motion of a differential with clutches, as functions of plain floats.
 
 In y = (w, s), the carrier speed omega_0 and the slip omega_1 - omega_2, under held torques T::
 
     dy/dt = A y + B T - C F
     M     = P y + Q T - W F
     F_k   = tanh(a_k s) (phi_k |M_k| + S_k)       (56), (58): phi_k = tan(alpha) f_k at full slip
+    M_F   = P_F y + Q_F T - W_F F                 of the final drive, where there is one
 
 While a shaft drives the mechanism phi_k is that times the coast factor of its clutch; S_k, of the
 preload and the actuator, has none. M is in the sign of the paper, whose shaft drives where the
@@ -25,10 +26,22 @@ with t_k = tanh(a_k s) and x_k = dF_k/dM_k = t_k phi_k sgn(M_k).
 
 from dataclasses import dataclass
 from math import tan, tanh
+from typing import NamedTuple
 
 import numpy as np
 
 from dm_ros.mechanism.power_flow import DIRECT
+
+
+class LinearResponse(NamedTuple):
+    """Accelerations and internal moments, linear in speeds, torques and clutch moments."""
+
+    A: np.ndarray   # (2, 2)
+    B: np.ndarray   # (2, ports)
+    C: np.ndarray   # (2, 2)
+    P: np.ndarray   # (moments, 2), those of the meshes with the outputs last
+    Q: np.ndarray   # (moments, ports)
+    W: np.ndarray   # (moments, 2)
 
 
 def slip_steepness(p):
@@ -125,9 +138,28 @@ def coefficients(p, response, proportional=True, direction=DIRECT):
     r = response
     phi = proportional_friction(p) if proportional else ((0.0, 0.0), (0.0, 0.0))
     driving, coasting = phi if direction == DIRECT else phi[::-1]
-    matrices = (r.A, r.C, r.P, r.W, r.B, r.Q)
+    matrices = (r.A, r.C, r.P[-2:], r.W[-2:], r.B, r.Q[-2:])
     numbers = np.concatenate([np.ravel(m) for m in matrices]).tolist()
     return Coefficients(*numbers, *slip_steepness(p), *driving, *coasting)
+
+
+@dataclass(frozen=True, slots=True)
+class FinalDrive:
+    """The coefficients of M_F, for one direction of power flow."""
+
+    P_w: float
+    P_s: float
+    Q_0: float
+    Q_1: float
+    Q_2: float
+    W_1: float
+    W_2: float
+
+
+def final_drive(response):
+    """Return the ``FinalDrive`` of a ``LinearResponse`` in (omega_0, slip)."""
+    rows = response.P[0], response.Q[0], response.W[0]
+    return FinalDrive(*np.concatenate(rows).tolist())
 
 
 def held(k, T, S):
@@ -191,6 +223,14 @@ def jacobian(k, u, point):
     return ((k.A_ww - k.C_w1 * F_1w - k.C_w2 * F_2w, k.A_ws - k.C_w1 * F_1s - k.C_w2 * F_2s,
              k.A_sw - k.C_s1 * F_1w - k.C_s2 * F_2w, k.A_ss - k.C_s1 * F_1s - k.C_s2 * F_2s),
             (F_1w, F_1s, F_2w, F_2s))
+
+
+def final_drive_moment(k, y, T, point):
+    """Return M_F at a ``point`` of the state y, by ``FinalDrive``."""
+    (w, s), (T_0, T_1, T_2) = y, T
+    _, _, F_1, F_2, _, _, _, _, _, _ = point
+    return (k.P_w * w + k.P_s * s + k.Q_0 * T_0 + k.Q_1 * T_1 + k.Q_2 * T_2
+            - k.W_1 * F_1 - k.W_2 * F_2)
 
 
 def solve_moments(z, W, x, coasting=None):

@@ -73,6 +73,18 @@ def symmetric(k, ww, ws, ss, M_F_w, M_1_w1, M_2_w2, M_1_w, M_2_w, T_3_w3):
             + k.carrier_1 * M_1_w + k.carrier_2 * M_2_w + k.carrier_F * M_F_w)
 
 
+def symmetric_with_clutches(k, ww, ws, ss, F_1_w, F_1_s, F_2_w, F_2_s, M_F_w, M_1_w, M_1_s,
+                            M_2_w, M_2_s, T_3_w3):
+    """
+    Return what ``symmetric`` does and what the left and the right clutch lose.
+
+    ``F_1_w`` is the product of F_1 and w, and so on.
+    """
+    *others, carrier = symmetric(k, ww, ws, ss, M_F_w, M_1_w + M_1_s / 2, M_2_w - M_2_s / 2,
+                                 M_1_w, M_2_w, T_3_w3)
+    return (*others, carrier - k.carrier_L * (F_1_w + F_2_w), F_1_s / 2, -F_2_s / 2)
+
+
 @dataclass(frozen=True, slots=True)
 class SelfLockingLosses:
     """The coefficients of ``self_locking``, for one direction of power flow."""

@@ -100,6 +100,11 @@ def mesh_sign_speed():
                'passive law: speed of a shaft at which its mesh takes three quarters of its loss')
 
 
+def pressure_angle():
+    return row('pressure_angle', math.radians(20.0), 'rad', 0.0, 1.5,
+               'gearing angle; 0 takes away the load-proportional friction')
+
+
 def satellite_count(default):
     return row('satellite_count', default, '1', 1, 64, 'number of satellites', kind=int)
 
@@ -149,15 +154,79 @@ class Parameters:
         """Refuse values that are each allowed but make an impossible mechanism."""
 
 
+def clutch(shaft, symbol):
+    """Return the row of one clutch parameter, given by its symbol without the shaft number."""
+    surfaces, radius, preload = {'front': (1, 0.040, 100.0), 'rear': (9, 0.060, 100.0),
+                                 'left': (0, 0.050, 0.0), 'right': (0, 0.050, 0.0)}[shaft]
+    name = f'clutch.{shaft}'
+    return {
+        'n_F': row(f'{name}.friction_surfaces', surfaces, '1', 0, 1000,
+                   f'number of friction surfaces of the {shaft} clutch', kind=int),
+        'mu': row(f'{name}.friction_coefficient', 0.15, '1', 0.0, 10.0,
+                  f'friction coefficient of the {shaft} clutch'),
+        'c_f': row(f'{name}.slip_steepness', 4.0, 's/rad', 0.0, 1e4,
+                   f'steepness of the {shaft} clutch friction over slip, tanh(c_f slip)'),
+        'R_F': row(f'{name}.radius', radius, 'm', 0.0, 10.0,
+                   f'mean friction radius of the {shaft} clutch ({ASSUMED})', above_low=True),
+        'N': row(f'{name}.preload', preload, 'N', 0.0, 1e6,
+                 f'axial preload of the {shaft} clutch, for each satellite ({ASSUMED})'),
+        'c': row(f'{name}.coast_factor', 1.0, '1', 0.0, 1.0,
+                 f'share of its load-proportional friction that the {shaft} clutch has while the '
+                 'shaft drives; 1: a 2-way, 0: a 1-way differential'),
+        'tau': row(f'{name}.actuator_time_constant', 0.0, 's', 0.0, 1e3,
+                   f'lag of the force on the {shaft} clutch; 0 for none'),
+        'A': row(f'{name}.actuator_limit', 1e6, 'N', 0.0, 1e9,
+                 f'a larger force on the {shaft} clutch is clamped to this'),
+    }[symbol]
+
+
+class ClutchedParameters(Parameters):
+    """What both mechanisms have in common: clutches between the crown gears and the carrier."""
+
+    shafts = ()   # names of the shafts with a clutch
+
+    @property
+    def f(self):
+        """Friction factors f_k of (55) at full slip, as a pair."""
+        return (self.n_F1 * self.mu_1 * self.R_F1 / self.R_1,
+                self.n_F2 * self.mu_2 * self.R_F2 / self.R_2)
+
+    def _check_mechanism(self):
+        """
+        Refuse clutches that lock the mechanism by its own gear moments.
+
+        With signed factors x_k = +-tan(alpha) f_k the moments M solve (I + W diag(x)) M = r.
+        For every inertia and both directions of flow the determinant stays positive, so that
+        exactly one sign pattern of M is a solution, while |x_k| < eta_kG eta_0B: the
+        homogeneous carrier equation then asks for M_1 and M_2 of opposite signs and the
+        homogeneous satellite equation for equal ones. At the limit an inertia-free mechanism
+        locks in reverse flow.
+        """
+        for shaft, f, eta in zip(self.shafts, self.f, (self.eta_1G, self.eta_2G)):
+            gain, limit = math.tan(self.alpha) * f, eta * self.eta_0B
+            if gain and not gain < limit:
+                raise ValueError(
+                    f'{self.prefix}.clutch.{shaft}: the clutch locks itself, tan(pressure_angle) '
+                    f'friction_surfaces friction_coefficient radius/{self.gear_radius} = '
+                    f'{gain:.4g} must be below {shaft}_mesh carrier_bearing efficiency = '
+                    f'{limit:.4g}')
+
+
 @dataclass(frozen=True)
-class SymmetricParameters(Parameters):
+class SymmetricParameters(ClutchedParameters):
     """
     The symmetric differential with final drive; the defaults are those of Table 1.
 
-    :raises ValueError: names the parameter, its value and what is allowed.
+    Clutches between the side gears and the carrier, which the paper does not have, come with
+    their friction surfaces.
+
+    :raises ValueError: names the parameter, its value and what is allowed; also for clutches
+        so strong that the mechanism locks itself.
     """
 
     prefix = 'symmetric'
+    shafts = ('left', 'right')
+    gear_radius = 'side_gear_radius'
 
     g_F: float = row('final_drive_ratio', 3.517, '1', -1e3, 1e3,
                      'pinion speed over carrier speed, not 0; '
@@ -181,6 +250,43 @@ class SymmetricParameters(Parameters):
     eta_1G: float = efficiency('left_mesh', 0.99)
     eta_2G: float = efficiency('right_mesh', 0.99)
     sign_speed: float = mesh_sign_speed()
+    alpha: float = pressure_angle()
+    R: float = row('side_gear_radius', 0.03, 'm', 0.0, 10.0,
+                   f'radius of the side gears ({ASSUMED}); it counts where there are clutches',
+                   above_low=True)
+    n_F1: int = clutch('left', 'n_F')
+    n_F2: int = clutch('right', 'n_F')
+    mu_1: float = clutch('left', 'mu')
+    mu_2: float = clutch('right', 'mu')
+    c_f1: float = clutch('left', 'c_f')
+    c_f2: float = clutch('right', 'c_f')
+    R_F1: float = clutch('left', 'R_F')
+    R_F2: float = clutch('right', 'R_F')
+    N_1: float = clutch('left', 'N')
+    N_2: float = clutch('right', 'N')
+    c_1: float = clutch('left', 'c')
+    c_2: float = clutch('right', 'c')
+    tau_1: float = clutch('left', 'tau')
+    tau_2: float = clutch('right', 'tau')
+    A_1: float = clutch('left', 'A')
+    A_2: float = clutch('right', 'A')
+
+    g_12 = 1.0   # ratio between the output shafts at stopped carrier
+
+    @property
+    def R_1(self):
+        """Radius of the left side gear, m."""
+        return self.R
+
+    @property
+    def R_2(self):
+        """Radius of the right side gear, m."""
+        return self.R
+
+    @property
+    def has_clutches(self):
+        """Whether there are clutches: whether any surface rubs."""
+        return self.n_F1 > 0 or self.n_F2 > 0
 
     @property
     def rated_efficiency(self):
@@ -190,6 +296,7 @@ class SymmetricParameters(Parameters):
     def _check_mechanism(self):
         if self.g_F == 0.0:
             raise ValueError('symmetric.final_drive_ratio: 0.0 is not allowed, it must not be 0')
+        super()._check_mechanism()
 
 
 def crown_radius(shaft, default):
@@ -197,34 +304,8 @@ def crown_radius(shaft, default):
                f'radius of the {shaft} crown gear ({ASSUMED})', above_low=True)
 
 
-def clutch(shaft, symbol):
-    """Return the row of one clutch parameter, given by its symbol without the shaft number."""
-    surfaces = {'front': 1, 'rear': 9}[shaft]
-    radius = {'front': 0.040, 'rear': 0.060}[shaft]
-    name = f'clutch.{shaft}'
-    return {
-        'n_F': row(f'{name}.friction_surfaces', surfaces, '1', 0, 1000,
-                   f'number of friction surfaces of the {shaft} clutch', kind=int),
-        'mu': row(f'{name}.friction_coefficient', 0.15, '1', 0.0, 10.0,
-                  f'friction coefficient of the {shaft} clutch'),
-        'c_f': row(f'{name}.slip_steepness', 4.0, 's/rad', 0.0, 1e4,
-                   f'steepness of the {shaft} clutch friction over slip, tanh(c_f slip)'),
-        'R_F': row(f'{name}.radius', radius, 'm', 0.0, 10.0,
-                   f'mean friction radius of the {shaft} clutch ({ASSUMED})', above_low=True),
-        'N': row(f'{name}.preload', 100.0, 'N', 0.0, 1e6,
-                 f'axial preload of the {shaft} clutch, for each satellite ({ASSUMED})'),
-        'c': row(f'{name}.coast_factor', 1.0, '1', 0.0, 1.0,
-                 f'share of its load-proportional friction that the {shaft} clutch has while the '
-                 'shaft drives; 1: a 2-way, 0: a 1-way differential'),
-        'tau': row(f'{name}.actuator_time_constant', 0.0, 's', 0.0, 1e3,
-                   f'lag of the force on the {shaft} clutch; 0 for none'),
-        'A': row(f'{name}.actuator_limit', 1e6, 'N', 0.0, 1e9,
-                 f'a larger force on the {shaft} clutch is clamped to this'),
-    }[symbol]
-
-
 @dataclass(frozen=True)
-class SelfLockingParameters(Parameters):
+class SelfLockingParameters(ClutchedParameters):
     """
     The asymmetric self-locking differential; the defaults are those of Table 2.
 
@@ -235,6 +316,8 @@ class SelfLockingParameters(Parameters):
     """
 
     prefix = 'lsd'
+    shafts = ('front', 'rear')
+    gear_radius = 'crown_radius'
 
     R_1: float = crown_radius('front', 0.040)
     R_2: float = crown_radius('rear', 0.060)
@@ -253,8 +336,7 @@ class SelfLockingParameters(Parameters):
     eta_1G: float = efficiency('front_mesh', 0.99)
     eta_2G: float = efficiency('rear_mesh', 0.99)
     sign_speed: float = mesh_sign_speed()
-    alpha: float = row('pressure_angle', math.radians(20.0), 'rad', 0.0, 1.5,
-                       'gearing angle; 0 takes away the load-proportional friction')
+    alpha: float = pressure_angle()
     n_F1: int = clutch('front', 'n_F')
     n_F2: int = clutch('rear', 'n_F')
     mu_1: float = clutch('front', 'mu')
@@ -272,37 +354,14 @@ class SelfLockingParameters(Parameters):
     A_1: float = clutch('front', 'A')
     A_2: float = clutch('rear', 'A')
 
+    has_clutches = True
+
     @property
     def g_12(self):
         """Ratio between the output shafts at stopped carrier, R_2/R_1."""
         return self.R_2 / self.R_1
 
     @property
-    def f(self):
-        """Friction factors f_k of (55) at full slip, as a pair."""
-        return (self.n_F1 * self.mu_1 * self.R_F1 / self.R_1,
-                self.n_F2 * self.mu_2 * self.R_F2 / self.R_2)
-
-    @property
     def rated_efficiency(self):
         """Efficiency as (37), without final drive; the gears weigh by their torque, 1 : g_12."""
         return self.eta_0B * (self.eta_1G + self.g_12 * self.eta_2G) / (1 + self.g_12)
-
-    def _check_mechanism(self):
-        """
-        Refuse clutches that lock the mechanism by its own gear moments.
-
-        With signed factors x_k = +-tan(alpha) f_k the moments M solve (I + W diag(x)) M = r.
-        For every inertia and both directions of flow the determinant stays positive, so that
-        exactly one sign pattern of M is a solution, while |x_k| < eta_kG eta_0B: the
-        homogeneous carrier equation then asks for M_1 and M_2 of opposite signs and the
-        homogeneous satellite equation for equal ones. At the limit an inertia-free mechanism
-        locks in reverse flow.
-        """
-        for shaft, f, eta in zip(('front', 'rear'), self.f, (self.eta_1G, self.eta_2G)):
-            gain, limit = math.tan(self.alpha) * f, eta * self.eta_0B
-            if not gain < limit:
-                raise ValueError(
-                    f'lsd.clutch.{shaft}: the clutch locks itself, tan(pressure_angle) '
-                    f'friction_surfaces friction_coefficient radius/crown_radius = {gain:.4g} '
-                    f'must be below {shaft}_mesh carrier_bearing efficiency = {limit:.4g}')

@@ -27,10 +27,9 @@ held torques each formulation is linear but for the clutch moments F = (F_1, F_2
 ``LinearResponse`` holds these matrices; ``clutched`` takes all three lines at once.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
+from dm_ros.mechanism.clutched import LinearResponse
 from dm_ros.mechanism.efficiencies import of_flow
 from dm_ros.mechanism.ports import acting_on, force, torque
 from dm_ros.mechanism.power_flow import REVERSE
@@ -43,17 +42,6 @@ BEARINGS = ('carrier_bearing',)
 CLUTCHES = ('front', 'rear')
 ACTUATORS = force('front_clutch'), force('rear_clutch')
 ON_SHAFTS = acting_on(SHAFTS, PORTS)
-
-
-class LinearResponse(NamedTuple):
-    """Accelerations and gear moments, linear in speeds, torques and clutch moments."""
-
-    A: np.ndarray   # (2, 2)
-    B: np.ndarray   # (2, ports)
-    C: np.ndarray   # (2, 2)
-    P: np.ndarray   # (2, 2)
-    Q: np.ndarray   # (2, ports)
-    W: np.ndarray   # (2, 2)
 
 
 def kinematics(p):

@@ -14,20 +14,22 @@ carrier, left, right, pinion, satellite. ``T`` holds the torques on the ports, i
 torque is positive when it accelerates its shaft. Where a printed equation contradicts the others,
 the corrected form stands here, marked "erratum", and a test shows that the printed one fails.
 
-Under held torques both are linear. Each gives, for one flow of power (direct, reverse, or
-what stands for the efficiencies of direct flow under the passive law, see ``efficiencies``)::
+Under held torques both are linear but for the moments F = (F_1, F_2) of clutches between the side
+gears and the carrier, if there are any; those react as in (59). Each gives, for one flow of power
+(direct, reverse, or what stands for the efficiencies of direct flow under the passive law, see
+``efficiencies``)::
 
-    e_D = A omega_D + B T        omega_D = (omega_1, omega_2), e_D = d omega_D/dt
-    M   = P omega_D + Q T        M = (M_F, M_1, M_2), in the sign of the paper
+    e_D = A omega_D + B T - C F      omega_D = (omega_1, omega_2), e_D = d omega_D/dt
+    M   = P omega_D + Q T - W F      M = (M_F, M_1, M_2), in the sign of the paper
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
+from dm_ros.mechanism.clutched import LinearResponse
 from dm_ros.mechanism.efficiencies import of_flow
-from dm_ros.mechanism.ports import acting_on, torque
+from dm_ros.mechanism.ports import acting_on, force, torque
 from dm_ros.mechanism.power_flow import REVERSE
 
 SHAFTS = ('carrier', 'left', 'right', 'pinion', 'satellite')
@@ -35,16 +37,17 @@ PORTS = torque('pinion'), torque('left'), torque('right')
 OUTPUTS = ('left', 'right')
 GEARS = ('final_drive', 'left_mesh', 'right_mesh')
 BEARINGS = ('pinion_bearing', 'carrier_bearing')
+CLUTCHES = OUTPUTS
+ACTUATORS = force('left_clutch'), force('right_clutch')
 ON_SHAFTS = acting_on(SHAFTS, PORTS)
+TO_SLIP = np.array([[0.5, 0.5], [1.0, -1.0]])   # (omega_0, slip) from (omega_1, omega_2)
 
 
-class LinearResponse(NamedTuple):
-    """Accelerations and internal moments, linear in speeds and torques."""
-
-    A: np.ndarray   # (2, 2)
-    B: np.ndarray   # (2, ports)
-    P: np.ndarray   # (3, 2)
-    Q: np.ndarray   # (3, ports)
+def in_slip(r):
+    """Return a ``LinearResponse`` in (omega_0, slip), from one in (omega_1, omega_2)."""
+    from_slip = np.linalg.inv(TO_SLIP)
+    return LinearResponse(TO_SLIP @ r.A @ from_slip, TO_SLIP @ r.B, TO_SLIP @ r.C,
+                          r.P @ from_slip, r.Q, r.W)
 
 
 def kinematics(p):
@@ -137,6 +140,7 @@ class SymmetricOde:
         L = self.viscous()
         A = -np.linalg.solve(I_D, eta_l @ g_L @ L)                                     # (34)
         B = np.linalg.solve(I_D, eta_t @ g_T)
+        C = np.linalg.solve(I_D, eta_l[:, 1:3])   # F_k acts wherever L_k does
 
         # the moments: M_F from (17) or the pinion equation in reverse flow, M_k from (10)
         e = np.array([[0.5, 0.5], [1, 0], [0, 1]])   # (e_0, e_1, e_2) from e_D
@@ -147,14 +151,17 @@ class SymmetricOde:
             drag = np.array([-p.g_F * (eta.pinion_mesh / eta.pinion_drag) * L[3], L[1], L[2]])
             load = np.array([[0, 0, p.g_F * eta.pinion_mesh * eta.pinion_input],
                              [-1, 0, 0], [0, -1, 0]])
+            friction = np.eye(3, 2, k=-1)
         else:
             eta_M = np.diag([1 / p.eta_FG, 1, 1])
             inertia = np.diag([p.I_3 * p.g_F**2, -p.I_1, -p.I_2])
             drag = np.array([p.g_F / p.eta_3B * L[3], -L[1], -L[2]])
             load = np.array([[0, 0, -p.g_F / p.eta_3B], [1, 0, 0], [0, 1, 0]])
-        return LinearResponse(A, B,
+            friction = -np.eye(3, 2, k=-1)
+        return LinearResponse(A, B, C,
                               eta_M @ (inertia @ e @ A + drag),
-                              eta_M @ (inertia @ e @ B + load @ ON_SHAFTS[1:4]))
+                              eta_M @ (inertia @ e @ B + load @ ON_SHAFTS[1:4]),
+                              eta_M @ (inertia @ e @ C - friction))
 
 
 class SymmetricDae:
@@ -218,7 +225,11 @@ class SymmetricDae:
         return eta_m, eta_l, eta_t
 
     def system(self, flow):
-        """Return A (8, 8) and B (8, 8) of x' = A x + B u, x = (omega, K), (49)-(51)."""
+        """
+        Return A (8, 8), B (8, 8), C (8, 2) of x' = A x + B u - C F, (49)-(51).
+
+        x is (omega, K), u the torques on the elements, F the moments of the clutches.
+        """
         p = self.p
         eta_m, eta_l, eta_t = self.efficiencies(of_flow(p, flow))
         inertia = np.diag([p.I_0, p.I_1, p.I_2, p.I_3, p.I_s])
@@ -234,13 +245,15 @@ class SymmetricDae:
         g_L = np.block([[eta_l @ g @ l_omega @ e_omega, np.zeros((5, 3))],
                         [np.zeros((3, 8))]])
         g_T = np.block([[eta_t @ g, np.zeros((5, 3))], [np.zeros((3, 8))]])
-        return -np.linalg.solve(I_D, g_L), np.linalg.solve(I_D, g_T)
+        g_C = np.vstack([eta_l[:, 1:3], np.zeros((3, 2))])   # F_k acts wherever L_k does
+        return -np.linalg.solve(I_D, g_L), np.linalg.solve(I_D, g_T), np.linalg.solve(I_D, g_C)
 
     def response(self, flow):
         """Return the ``LinearResponse`` for a flow: DIRECT, REVERSE, or ``Efficiencies``."""
-        A, B = self.system(flow)
+        A, B, C = self.system(flow)
         A, B = A[:, :5] @ self.lift(), B[:, :5] @ ON_SHAFTS   # T_D of (48), 0 where no port is
-        return LinearResponse(A[self.INDEPENDENT], B[self.INDEPENDENT], A[5:], B[5:])
+        D = self.INDEPENDENT
+        return LinearResponse(A[D], B[D], C[D], A[5:], B[5:], C[5:])
 
 
 @dataclass(frozen=True, slots=True)

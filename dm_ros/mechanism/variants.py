@@ -63,6 +63,8 @@ SELF_LOCKING = Mechanism(
     outputs=self_locking.OUTPUTS, gears=self_locking.GEARS, bearings=self_locking.BEARINGS,
     clutches=self_locking.CLUTCHES, actuators=self_locking.ACTUATORS, load=loads.self_locking)
 MECHANISMS = {mechanism.name: mechanism for mechanism in (SYMMETRIC, SELF_LOCKING)}
+WITH_CLUTCHES = {**MECHANISMS, SYMMETRIC.name: SYMMETRIC._replace(
+    clutches=symmetric.CLUTCHES, actuators=symmetric.ACTUATORS)}
 
 CATALOGUE = {variant.name: variant for variant in (
     Variant('symmetric_ode', SYMMETRIC, symmetric.SymmetricOde, '3.3, variant 1', 'ε₁ ε₂'),
@@ -75,6 +77,11 @@ CATALOGUE = {variant.name: variant for variant in (
             'ε₀ ε₁ ε₂ εₛ M₁ M₂'),
 )}
 VARIANTS = tuple(CATALOGUE)
+
+
+def equipped(mechanism, parameters):
+    """Return a ``Mechanism`` with the clutches that its parameters give it, if any."""
+    return WITH_CLUTCHES[mechanism.name] if parameters.has_clutches else mechanism
 
 
 def variant_named(name):

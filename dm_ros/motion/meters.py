@@ -19,14 +19,16 @@ import numpy as np
 
 from dm_ros.mechanism import losses, passive, self_locking, symmetric
 from dm_ros.mechanism.clutched import evaluate
+from dm_ros.mechanism.symmetric import TO_SLIP
 from dm_ros.motion.exponentials import way
 from dm_ros.motion.models import (
+    ClutchedModel,
+    ClutchedSymmetricModel,
     PassiveModel,
     PassiveSymmetricModel,
-    SelfLockingModel,
     SymmetricModel,
 )
-from dm_ros.motion.patterns import Pattern, TO_SLIP
+from dm_ros.motion.patterns import Pattern
 from dm_ros.motion.quadrature import rule_for, second_moment_of_the_way
 
 
@@ -34,6 +36,19 @@ def kinetic_form(inertias, shafts):
     """Return (m_11, m_12, m_22): kinetic energy is (m_11 x_1^2 + m_22 x_2^2)/2 + m_12 x_1 x_2."""
     m = shafts.T @ (np.array(inertias)[:, None] * shafts)
     return float(m[0, 0]), float(m[0, 1]), float(m[1, 1])
+
+
+def symmetric_form(p):
+    """Return the form of the kinetic energy of a symmetric differential in (w, s)."""
+    return kinetic_form((p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s),
+                        symmetric.kinematics(p) @ np.linalg.inv(TO_SLIP))
+
+
+def self_locking_form(p):
+    """Return the form of the kinetic energy of a self-locking differential in (w, s)."""
+    return kinetic_form(
+        (p.I_0, p.I_1, p.I_2, p.n_s * p.I_s),
+        self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p)))
 
 
 def kinetic_energy(m, x):
@@ -93,8 +108,7 @@ class SymmetricMeter:
 
     def __init__(self, model):
         p, self._h = model.parameters, model.h
-        self._m = kinetic_form((p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s),
-                               symmetric.kinematics(p) @ np.linalg.inv(TO_SLIP))
+        self._m = symmetric_form(p)
         self._g_F, self._linear = p.g_F, {}
         for direction, r in model.responses.items():
             from_slip = np.linalg.inv(TO_SLIP)
@@ -120,9 +134,9 @@ def in_slip(x):
     return (x_1 + x_2) / 2, x_1 - x_2
 
 
-class SelfLockingMeter:
+class ClutchedMeter:
     """
-    The books of a self-locking differential, along the path of ``adaptive.step``.
+    The books of a self-locking differential under the paper's law, along an adaptive step.
 
     In a part of that path the friction is its tangent at the start and a remainder, which is as
     small as what the step calls its error: Simpson's rule will do for it. The rest is linear, and
@@ -135,9 +149,9 @@ class SelfLockingMeter:
 
     def __init__(self, model):
         p = model.parameters
-        self._m = kinetic_form(
-            (p.I_0, p.I_1, p.I_2, p.n_s * p.I_s),
-            self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p)))
+        self._m = self_locking_form(p)
+        self._k_1, self._k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
+        self._input_ratio = 1.0   # of the input shaft to the carrier
         self._coefficients = model.coefficients
         self._losses = {d: losses.self_locking_losses(p, d) for d in model.responses}
 
@@ -149,18 +163,18 @@ class SelfLockingMeter:
         """Return the energies of a step, see the module."""
         x, direction, end, (a_w, a_s), _, _, (u, parts) = step
         T_0, T_1, T_2 = T
-        k, q = self._coefficients[direction], self._losses[direction]
         first, *others = parts
-        lost, numerical = self._part(k, q, u, T_0, first)
+        lost, numerical = self._part(direction, u, T, first)
         for part in others:
-            more, taken = self._part(k, q, u, T_0, part)
+            more, taken = self._part(direction, u, T, part)
             lost = tuple(map(add, lost, more))
             numerical += taken
-        return (T_0 * a_w, T_1 * (a_w + q.k_1 * a_s), T_2 * (a_w - q.k_2 * a_s),
-                energy_gained(self._m, x, end), *lost, numerical)
+        return (T_0 * self._input_ratio * a_w, T_1 * (a_w + self._k_1 * a_s),
+                T_2 * (a_w - self._k_2 * a_s), energy_gained(self._m, x, end), *lost, numerical)
 
-    def _part(self, k, q, u, T_0, part):
+    def _part(self, direction, u, T, part):
         """Return what the elements lost in a part of the path, and what its error took."""
+        k = self._coefficients[direction]
         (w, s), f, J, F, h, (d_w, d_s), (c_w, c_s), (a_w, a_s), straight, here, there = part
         (J_ww, J_ws, J_sw, J_ss), (F_1w, F_1s, F_2w, F_2s) = J, F
         v_w, v_s, F_1, F_2, _, _, _, _, _, _ = here
@@ -236,13 +250,35 @@ class SelfLockingMeter:
         F_2_w = F_2 * a_w + F_2w * V_ww + F_2s * V_sw + f_2w
         F_2_s = F_2 * a_s + F_2w * V_ws + F_2s * V_ss + f_2s
         _, _, m_1, m_2, _, _ = u
-        return losses.self_locking(
-            q, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s,
+        return self._lost(
+            direction, T, a_w, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s,
             m_1 * a_w + k.P_1w * X_ww + k.P_1s * X_ws - k.W_11 * F_1_w - k.W_12 * F_2_w,
             m_1 * a_s + k.P_1w * X_ws + k.P_1s * X_ss - k.W_11 * F_1_s - k.W_12 * F_2_s,
             m_2 * a_w + k.P_2w * X_ww + k.P_2s * X_ws - k.W_21 * F_1_w - k.W_22 * F_2_w,
-            m_2 * a_s + k.P_2w * X_ws + k.P_2s * X_ss - k.W_21 * F_1_s - k.W_22 * F_2_s,
-            T_0 * a_w), -taken
+            m_2 * a_s + k.P_2w * X_ws + k.P_2s * X_ss - k.W_21 * F_1_s - k.W_22 * F_2_s), -taken
+
+    def _lost(self, direction, T, a_w, *products):
+        """Return what the elements lose, from products as ``losses`` has them."""
+        return losses.self_locking(self._losses[direction], *products, T[0] * a_w)
+
+
+class ClutchedSymmetricMeter(ClutchedMeter):
+    """The books of a symmetric differential with clutches under the paper's law."""
+
+    def __init__(self, model):
+        super().__init__(model)
+        p = model.parameters
+        self._m, self._input_ratio = symmetric_form(p), p.g_F
+        self._final_drives = model.final_drives
+        self._losses = {d: losses.symmetric_losses(p, d) for d in model.responses}
+
+    def _lost(self, direction, T, a_w, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, *meshes):
+        k, (T_3, T_1, T_2) = self._final_drives[direction], T
+        M_F_w = ((k.Q_0 * T_3 + k.Q_1 * T_1 + k.Q_2 * T_2) * a_w + k.P_w * X_ww + k.P_s * X_ws
+                 - k.W_1 * F_1_w - k.W_2 * F_2_w)
+        return losses.symmetric_with_clutches(
+            self._losses[direction], X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, M_F_w,
+            *meshes, T_3 * self._input_ratio * a_w)
 
 
 class PassiveMeter:
@@ -256,14 +292,8 @@ class PassiveMeter:
 
     def __init__(self, model):
         p, self._h = model.parameters, model.h
-        self._k, self._with_final_drive = model.k, bool(model.k.g_F)
-        if self._with_final_drive:
-            shafts = symmetric.kinematics(p) @ np.linalg.inv(TO_SLIP)
-            inertias = p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s
-        else:
-            shafts = self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p))
-            inertias = p.I_0, p.I_1, p.I_2, p.n_s * p.I_s
-        self._m = kinetic_form(inertias, shafts)
+        self._k, self._clutches = model.k, model.clutches
+        self._m = symmetric_form(p) if model.k.g_F else self_locking_form(p)
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
@@ -284,10 +314,11 @@ class PassiveMeter:
                 lost, numerical = more, taken
             else:
                 lost, numerical = tuple(map(add, lost, more)), numerical + taken
-        drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0, clutch_1, clutch_2 = lost
+        drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0, *clutches = lost
         lost = ((drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0)
-                if self._with_final_drive else
-                (drag, mesh_1, mesh_2, bearing_0, clutch_1, clutch_2))
+                if k.g_F else (drag, mesh_1, mesh_2, bearing_0))
+        if self._clutches:
+            lost += tuple(clutches)
         (T_in, T_1, T_2), (a_w, a_s) = T, integral
         return (T_in * (k.g_F or 1.0) * a_w, T_1 * (a_w + k.k_1 * a_s), T_2 * (a_w - k.k_2 * a_s),
                 energy_gained(self._m, x, end), *lost, numerical)
@@ -318,8 +349,8 @@ class PassiveMeter:
         return tuple([h * loss for loss in lost]), -h * taken
 
 
-METERS = {SymmetricModel: SymmetricMeter, SelfLockingModel: SelfLockingMeter,
-          PassiveModel: PassiveMeter, PassiveSymmetricModel: PassiveMeter}
+METERS = {SymmetricModel: SymmetricMeter, ClutchedModel: ClutchedMeter,
+          ClutchedSymmetricModel: ClutchedSymmetricMeter, PassiveModel: PassiveMeter, PassiveSymmetricModel: PassiveMeter}
 
 
 def meter_of(model):

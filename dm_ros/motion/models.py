@@ -22,7 +22,7 @@ import numpy as np
 
 from dm_ros.mechanism import clutched, passive, symmetric
 from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
-from dm_ros.mechanism.variants import SELF_LOCKING, SYMMETRIC
+from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.motion import adaptive, held_torque
 from dm_ros.motion.patterns import exact_step, Pattern, Patterns
 
@@ -97,13 +97,13 @@ class SymmetricModel:
         return symmetric.moments(self.moments[direction], x, T)
 
 
-class SelfLockingModel:
+class ClutchedModel:
     """A self-locking differential under the paper's law; x is (omega_0, omega_1 - omega_2)."""
 
     def __init__(self, formulation, parameters, h):
         self.parameters, self.h = parameters, h
-        self.responses = responses_of(formulation, parameters)
-        self.lagged = formulation.lagged
+        self.responses = self._responses(formulation)
+        self.lagged = getattr(formulation, 'lagged', False)
         self._g_12, self._g_2s = parameters.g_12, parameters.g_2s
         self._phi, self._preload = clutched.full_friction(parameters)
         # |M| of the last step feeds the friction of the next, which amplifies errors
@@ -112,6 +112,9 @@ class SelfLockingModel:
             direction: clutched.coefficients(
                 parameters, response, not self.lagged, direction)
             for direction, response in self.responses.items()}
+
+    def _responses(self, formulation):
+        return responses_of(formulation, self.parameters)
 
     def independent(self, omega_1, omega_2):
         """Return x for the given speeds of the output shafts."""
@@ -158,14 +161,44 @@ class SelfLockingModel:
             self.parameters, self._phi if self.lagged else None, self._preload, memory, forces)
 
 
+class ClutchedSymmetricModel(ClutchedModel):
+    """A symmetric differential with clutches under the paper's law; x is as of the other."""
+
+    def __init__(self, formulation, parameters, h):
+        super().__init__(formulation, parameters, h)
+        self._g_F = parameters.g_F
+        self.final_drives = {direction: clutched.final_drive(response)
+                             for direction, response in self.responses.items()}
+
+    def _responses(self, formulation):
+        return {direction: symmetric.in_slip(response) for direction, response
+                in responses_of(formulation, self.parameters).items()}
+
+    def all_shafts(self, x):
+        """Return the speeds of all shafts from x, or their angles from its integral, (5)-(7)."""
+        x_0, slip = x
+        return (x_0, x_0 + slip / 2, x_0 - slip / 2, self._g_F * x_0,
+                (0.0 - slip) / (2 * self._g_2s))
+
+    def flow(self, x, T, deadband, last):
+        """Return the power-flow index, (35)-(36)."""
+        x_0, x_1, x_2, x_3, _ = self.all_shafts(x)
+        T_3, T_1, T_2 = T
+        return power_flow(T_3 * x_3, T_1 * x_1 + T_2 * x_2, deadband, last)
+
+    def internal_moments(self, x, T, direction, point):
+        """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
+        M_F = clutched.final_drive_moment(self.final_drives[direction], x, T, point)
+        return direction * M_F, *super().internal_moments(x, T, direction, point)
+
+
 class PassiveModel:
     """A differential under the passive law; x is (omega_0, omega_1 - omega_2)."""
 
-    def __init__(self, formulation, parameters, h, mechanism):
-        self.parameters, self.h = parameters, h
+    def __init__(self, formulation, parameters, h, clutches):
+        self.parameters, self.h, self.clutches = parameters, h, clutches
         self.lagged = getattr(formulation, 'lagged', False)
         responses_of(formulation, parameters)   # refuses what overflows
-        self._clutches = clutches = bool(mechanism.clutches)
         self.k = passive.coefficients(parameters, clutches, not self.lagged)
         if not passive.has_solutions(self.k):
             raise no_solution(parameters)
@@ -203,8 +236,9 @@ class PassiveModel:
 
     def internal_moments(self, x, T, flow, point):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
-        _, _, F_1, F_2, M_1, M_2, *_ = point
-        return M_1, M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
+        _, _, F_1, F_2, M_1, M_2, M_F, *_ = point
+        outputs = M_1, M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
+        return (M_F + 0.0, *outputs) if self.k.g_F else outputs
 
     def remembered(self, point, flow):
         """Return the ``|M|`` that the friction of the next step of ``lsd_lagged`` knows."""
@@ -225,8 +259,8 @@ class PassiveModel:
 class PassiveSymmetricModel(PassiveModel):
     """A symmetric differential under the passive law: exact steps while no sign changes."""
 
-    def __init__(self, formulation, parameters, h, mechanism):
-        super().__init__(formulation, parameters, h, mechanism)
+    def __init__(self, formulation, parameters, h, clutches):
+        super().__init__(formulation, parameters, h, clutches)
         self._patterns = Patterns(formulation(parameters), parameters, self.k, h)
         self._guess = None   # the pattern met last: where it fits, it is the one
 
@@ -263,13 +297,17 @@ class PassiveSymmetricModel(PassiveModel):
         return point[6] + 0.0, point[4] + 0.0, point[5] + 0.0
 
 
-PAPER_MODELS = {SYMMETRIC.name: SymmetricModel, SELF_LOCKING.name: SelfLockingModel}
+def model_of(formulation, mechanism, loss_law, parameters, h):
+    """
+    Return the model of a formulation under a law of losses.
 
-
-def model_of(variant, loss_law, parameters, h):
-    """Return the model of a ``Variant`` under a law of losses, with a step of h, s."""
-    formulation, mechanism = variant.formulation, variant.mechanism
+    :param mechanism: its ``Mechanism``, with clutches or without; h: length of a step, s.
+    """
+    is_symmetric, clutches = mechanism.name == SYMMETRIC.name, bool(mechanism.clutches)
     if loss_law == PAPER:
-        return PAPER_MODELS[mechanism.name](formulation, parameters, h)
-    kind = PassiveModel if mechanism.clutches else PassiveSymmetricModel
-    return kind(formulation, parameters, h, mechanism)
+        kind = ClutchedModel if not is_symmetric else (
+            ClutchedSymmetricModel if clutches else SymmetricModel)
+        return kind(formulation, parameters, h)
+    if clutches:
+        return PassiveModel(formulation, parameters, h, clutches)
+    return PassiveSymmetricModel(formulation, parameters, h, clutches)

@@ -19,11 +19,11 @@ import numpy as np
 
 from dm_ros.mechanism import passive, symmetric
 from dm_ros.mechanism.losses import symmetric_drag, SymmetricLosses
+from dm_ros.mechanism.symmetric import TO_SLIP
 from dm_ros.motion import held_torque
 from dm_ros.motion.quadrature import second_moment_of_the_way
 
 MARGIN = 1e-9   # N m from turning round, within which no pattern is taken
-TO_SLIP = np.array([[0.5, 0.5], [1.0, -1.0]])   # (omega_0, slip) from (omega_1, omega_2)
 
 
 class Pattern(NamedTuple):
@@ -69,7 +69,7 @@ class Patterns:
         eta = passive.efficiencies(k, input_sign, point)
         with np.errstate(all='ignore'):
             try:
-                A, B, P, Q = self._equations.response(eta)
+                A, B, _, P, Q, _ = self._equations.response(eta)
                 A = TO_SLIP @ A @ np.linalg.inv(TO_SLIP)
                 step = held_torque.held_torque_step_by_floats(A, TO_SLIP @ B, self._h)
             except (ArithmeticError, np.linalg.LinAlgError, ValueError):

@@ -11,7 +11,7 @@ import math
 from operator import add
 
 from dm_ros.mechanism.power_flow import DIRECT
-from dm_ros.mechanism.variants import variant_named
+from dm_ros.mechanism.variants import equipped, variant_named
 from dm_ros.motion.actuators import actuators_of
 from dm_ros.motion.models import LOSS_LAWS, model_of, PASSIVE
 from dm_ros.motion.state import Snapshot, State
@@ -40,16 +40,17 @@ class Simulation:
     def __init__(self, variant, dt=0.001, parameters=None, *, loss_law=PASSIVE, substeps=1,
                  power_flow_deadband=0.0, initial_velocity=(0.0, 0.0)):
         self._variant = variant_named(variant)
+        self._model = None
         if loss_law not in LOSS_LAWS:
             raise ValueError(f'loss_law: {loss_law!r} is not one of {", ".join(LOSS_LAWS)}')
         self.loss_law = loss_law
-        self.mechanism = self._variant.mechanism
+        parameters = self._table({} if parameters is None else parameters)
+        self.mechanism = equipped(self._variant.mechanism, parameters)
         self.dt = checked('dt', dt, lambda v: v > 0.0, 'a positive number of seconds')
         self.power_flow_deadband = power_flow_deadband
         self.initial_velocity = initial_velocity
         self._substeps = None
-        self._model = None
-        self.adopt(self.prepare({} if parameters is None else parameters, substeps))
+        self.adopt(self.prepare(parameters, substeps))
         self.reset()
 
     @property
@@ -178,18 +179,26 @@ class Simulation:
         :param substeps: solver steps in a tick, None for those in force.
         :raises ValueError: names what is wrong, its value and what is allowed.
         """
-        kind = self.mechanism.parameters
-        if not isinstance(parameters, kind):
-            now = self._model.parameters if self._model else kind()
-            try:
-                parameters = now.changed(dict(parameters))
-            except TypeError:
-                raise ValueError(f'parameters: {type(parameters).__name__} is not '
-                                 f'{kind.__name__} or a mapping') from None
+        parameters = self._table(parameters)
+        if parameters.has_clutches and not self.mechanism.clutches:
+            raise ValueError(f'{parameters.prefix}.clutch: what began without clutches cannot get '
+                             'any while it runs; friction_surfaces must be set at the start')
         substeps = checked('substeps', self._substeps if substeps is None else substeps,
                            lambda v: v >= 1 and v == int(v), 'a positive integer')
-        return (model_of(self._variant, self.loss_law, parameters, self.dt / substeps),
-                int(substeps))
+        return (model_of(self._variant.formulation, self.mechanism, self.loss_law, parameters,
+                         self.dt / substeps), int(substeps))
+
+    def _table(self, parameters):
+        """Return a table of parameters, or those in force with a mapping of changes."""
+        kind = self._variant.mechanism.parameters
+        if isinstance(parameters, kind):
+            return parameters
+        now = self._model.parameters if self._model else kind()
+        try:
+            return now.changed(dict(parameters))
+        except TypeError:
+            raise ValueError(f'parameters: {type(parameters).__name__} is not '
+                             f'{kind.__name__} or a mapping') from None
 
     def adopt(self, prepared):
         """Take what ``prepare`` made; the speeds of the output shafts and all angles go on."""
