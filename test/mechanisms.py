@@ -24,13 +24,18 @@ def is_symmetric(variant):
 
 
 class Flow:
-    """A self-locking differential in one direction under held torques, as ``clutched`` has it."""
+    """A differential in one direction under held torques, as ``clutched`` has it."""
 
     law = PAPER
 
-    def __init__(self, p, T, direction, friction=None, formulation=SelfLockingOde):
-        """Take friction that does not follow M, or None for that of the preload beside it."""
-        self.k = clutched.coefficients(p, formulation(p).response(direction), friction is None)
+    def __init__(self, p, T, direction, friction=None, response=None):
+        """
+        Take friction that does not follow M, or None for that of the preload beside it.
+
+        :param response: in (w, s); None for that of ``SelfLockingOde``.
+        """
+        response = response or SelfLockingOde(p).response(direction)
+        self.k = clutched.coefficients(p, response, friction is None, direction)
         self.u = clutched.held(self.k, tuple(T), friction or clutched.full_friction(p)[1])
 
     def point(self, w, s):
@@ -57,9 +62,8 @@ class PassiveFlow(Flow):
 
     def __init__(self, p, T, friction=None):
         """Take friction that does not follow M, or None for that of the preload beside it."""
-        clutches = isinstance(p, SelfLockingParameters)
-        self.k = passive.coefficients(p, clutches, friction is None)
-        preload = clutched.full_friction(p)[1] if clutches else (0.0, 0.0)
+        self.k = passive.coefficients(p, p.has_clutches, friction is None)
+        preload = clutched.full_friction(p)[1] if p.has_clutches else (0.0, 0.0)
         self.u = passive.held(tuple(T), friction or preload)
 
     def lost(self, w, s):
@@ -108,33 +112,51 @@ def random_self_locking(rng, share=None, kind=SelfLockingParameters):
     """
     p = SelfLockingParameters()
     values = {**_spread(rng, p, ('I_', 'l_', 'R_', 'N_')), **_efficiencies(rng, p),
-              'n_s': int(rng.integers(1, 6)), 'g_2s': rng.uniform(0.2, 1.0),
-              'alpha': rng.uniform(0.15, 0.6),
-              'n_F1': int(rng.integers(1, 6)), 'n_F2': int(rng.integers(1, 10)),
-              'c_f1': rng.uniform(1, 8), 'c_f2': rng.uniform(1, 8)}
-    for k in '12':
+              'n_s': int(rng.integers(1, 6)), 'g_2s': rng.uniform(0.2, 1.0)}
+    radii = values['R_1'], values['R_2']
+    return kind(**{**values, **_clutches(rng, values, radii, share)})
+
+
+def _clutches(rng, values, radii, share=None):
+    """Return random clutches for a mechanism with the given efficiencies and gear radii."""
+    clutches = {'alpha': rng.uniform(0.15, 0.6),
+                'n_F1': int(rng.integers(1, 6)), 'n_F2': int(rng.integers(1, 10)),
+                'c_f1': rng.uniform(1, 8), 'c_f2': rng.uniform(1, 8)}
+    for k, radius in zip('12', radii):
         gain = rng.uniform(0, 0.95) if share is None else share
         limit = values[f'eta_{k}G'] * values['eta_0B']
-        values[f'R_F{k}'] = values[f'R_{k}'] * rng.uniform(0.7, 1.4)
-        values[f'mu_{k}'] = (gain * limit * values[f'R_{k}'] / values[f'R_F{k}']
-                             / values[f'n_F{k}'] / math.tan(values['alpha']))
-    return kind(**values)
+        clutches[f'R_F{k}'] = radius * rng.uniform(0.7, 1.4)
+        clutches[f'mu_{k}'] = (gain * limit * radius / clutches[f'R_F{k}']
+                               / clutches[f'n_F{k}'] / math.tan(clutches['alpha']))
+    return clutches
+
+
+def random_clutched_symmetric(rng):
+    """Return random admissible parameters of the symmetric differential with clutches."""
+    p, R = random_symmetric(rng), rng.uniform(0.01, 0.1)
+    return dataclasses.replace(
+        p, R=R, N_1=rng.uniform(0, 500), N_2=rng.uniform(0, 500),
+        **_clutches(rng, vars(p), (R, R)))
 
 
 def mirrored_symmetric(p):
     """Return the symmetric differential with left and right exchanged."""
-    return dataclasses.replace(
-        p, I_1=p.I_2, I_2=p.I_1, l_1=p.l_2, l_2=p.l_1, eta_1G=p.eta_2G, eta_2G=p.eta_1G)
+    return dataclasses.replace(p, **_exchanged(p))
+
+
+PAIRS = [(f'{name}_1', f'{name}_2') for name in ('I', 'l', 'mu', 'N', 'c')] + [
+    ('eta_1G', 'eta_2G'), ('n_F1', 'n_F2'), ('c_f1', 'c_f2'), ('R_F1', 'R_F2')]
+
+
+def _exchanged(p, more=()):
+    pairs = PAIRS + [*more]
+    return {a: getattr(p, b) for a, b in pairs} | {b: getattr(p, a) for a, b in pairs}
 
 
 def mirrored_self_locking(p):
     """Return the self-locking differential with front and rear exchanged."""
-    pairs = [('R_1', 'R_2'), ('I_1', 'I_2'), ('l_1', 'l_2'), ('eta_1G', 'eta_2G'),
-             ('n_F1', 'n_F2'), ('mu_1', 'mu_2'), ('c_f1', 'c_f2'), ('R_F1', 'R_F2'),
-             ('N_1', 'N_2')]
-    exchanged = {a: getattr(p, b) for a, b in pairs} | {b: getattr(p, a) for a, b in pairs}
     # g_2s is the satellite radius over the rear crown radius, and the rear is now the front
-    return dataclasses.replace(p, **exchanged, g_2s=p.g_2s * p.R_2 / p.R_1)
+    return dataclasses.replace(p, **_exchanged(p, [('R_1', 'R_2')]), g_2s=p.g_2s * p.R_2 / p.R_1)
 
 
 def symmetric_speeds(p, w_1, w_2):
@@ -196,11 +218,12 @@ def lagrange(p, energy, dissipation, power, w):
     return np.linalg.solve(form(energy, p), Q - form(dissipation, p) @ w)
 
 
-def symmetric_lagrange(p, w, T):
-    """Return (e_1, e_2) of the lossless symmetric differential under T = (T_1, T_2, T_3)."""
+def symmetric_lagrange(p, w, T, F=(0.0, 0.0)):
+    """Return (e_1, e_2) of the lossless symmetric one under T = (T_1, T_2, T_3) and F."""
     def power(w_1, w_2):
-        _, w_1, w_2, w_3, _ = symmetric_speeds(p, w_1, w_2)
-        return T[0] * w_1 + T[1] * w_2 + T[2] * w_3
+        w_0, w_1, w_2, w_3, _ = symmetric_speeds(p, w_1, w_2)
+        return (T[0] * w_1 + T[1] * w_2 + T[2] * w_3
+                - F[0] * (w_1 - w_0) - F[1] * (w_2 - w_0))
     return lagrange(p, symmetric_energy, symmetric_dissipation, power, w)
 
 

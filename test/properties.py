@@ -21,6 +21,7 @@ from mechanisms import (
     mirrored_self_locking,
     mirrored_symmetric,
     PassiveFlow,
+    random_clutched_symmetric,
     random_self_locking,
     random_symmetric,
     relative_difference,
@@ -33,7 +34,7 @@ from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIA
 from dm_ros.mechanism import clutched, passive, self_locking, symmetric
 from dm_ros.mechanism.self_locking import SelfLockingDae
 from dm_ros.mechanism.symmetric import SymmetricDae
-from dm_ros.mechanism.variants import variant_named
+from dm_ros.mechanism.variants import SYMMETRIC, variant_named, variants_of
 from dm_ros.motion.energy import AuditedSimulation
 from dm_ros.motion.models import PAPER, PASSIVE
 
@@ -88,18 +89,32 @@ def self_locking_parameters(rng):
         'R_1': power_of_ten(rng, -2, 0), 'alpha': or_zero(rng, rng.uniform(0.01, 0.8)),
         **{name: efficiency(rng) for name in ('eta_0B', 'eta_1G', 'eta_2G')}}
     values['R_2'] = values['R_1'] * power_of_ten(rng, -0.7, 0.7)
-    for k in '12':
-        radius = values[f'R_{k}'] * rng.uniform(0.5, 2.0)
+    return SelfLockingParameters(**values, **clutches(rng, values, values['R_1'], values['R_2']))
+
+
+def clutches(rng, values, *radii):
+    """Return clutches for a mechanism with the given efficiencies, gearing angle, gear radii."""
+    result = {}
+    for k, gear in zip('12', radii):
+        radius = gear * rng.uniform(0.5, 2.0)
         surfaces = int(rng.integers(0, 13))
         share = rng.choice([0.0, 0.99, rng.uniform(0.0, 0.99)])
         gain = share * values[f'eta_{k}G'] * values['eta_0B']
-        for_one = max(surfaces, 1) * radius / values[f'R_{k}'] * math.tan(values['alpha'])
-        values |= {
+        for_one = max(surfaces, 1) * radius / gear * math.tan(values['alpha'])
+        result |= {
             f'R_F{k}': radius, f'n_F{k}': surfaces,
             f'mu_{k}': min(gain / for_one, 10.0) if for_one else rng.uniform(0.0, 1.0),
             f'c_f{k}': or_zero(rng, power_of_ten(rng, -1, 3)),
             f'N_{k}': or_zero(rng, power_of_ten(rng, 0, 4))}
-    return SelfLockingParameters(**values)
+    return result
+
+
+def clutched_symmetric(rng, p):
+    """Return a symmetric differential with random clutches beside what it has."""
+    values = {**vars(p), 'alpha': or_zero(rng, rng.uniform(0.01, 0.8)),
+              'R': power_of_ten(rng, -2, 0), 'c_1': or_zero(rng, rng.uniform(0, 1)),
+              'c_2': or_zero(rng, rng.uniform(0, 1))}
+    return SymmetricParameters(**{**values, **clutches(rng, values, values['R'], values['R'])})
 
 
 def load(rng, ticks):
@@ -124,12 +139,15 @@ def load(rng, ticks):
     return T.tolist()
 
 
-def random_case(n):
-    """Return case n; the variants take turns."""
+def random_case(n, clutched=False):
+    """Return case n; the variants take turns, or those of the symmetric one with clutches."""
     rng = np.random.default_rng([3, n])
-    variant = VARIANTS[n % len(VARIANTS)]
+    variants = variants_of(SYMMETRIC) if clutched else VARIANTS
+    variant = variants[n % len(variants)]
     parameters = (symmetric_parameters if is_symmetric(variant)
                   else self_locking_parameters)(rng)
+    if clutched:
+        parameters = clutched_symmetric(np.random.default_rng([5, n]), parameters)
     rate = float(rng.choice([100.0, 1000.0, 1e4, power_of_ten(rng, 2, 4)]))
     speed = rng.choice([0.0, rng.normal(0.0, 50.0), 1e4, 1e6], p=[0.3, 0.3, 0.3, 0.1])
     start = speed * rng.choice([-1.0, 1.0, rng.uniform(-1, 1)], 2)
@@ -155,13 +173,12 @@ class Bound:
     def __init__(self, variant, p):
         formulation = variant_named(variant).formulation
         self._lagged = variant == 'lsd_lagged'
-        self._phi, self._preload = (0.0, 0.0), (0.0, 0.0)
+        self._phi, self._preload = clutched.full_friction(p)
         inertia = [p.I_0, p.I_1, p.I_2, p.n_s * p.I_s]
         if is_symmetric(variant):
             inertia.insert(3, p.I_3)
             shafts = symmetric.kinematics(p)
         else:
-            self._phi, self._preload = clutched.full_friction(p)
             shafts = self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p))
         self._to_v = np.linalg.qr(np.sqrt(inertia)[:, None] * shafts, 'r')
         self._growth, torque, friction = 0.0, [], []
@@ -175,14 +192,12 @@ class Bound:
 
     def _corners(self, r):
         """Yield A, B and K of x' = A x + B T - K (friction that does not follow M)."""
-        if isinstance(r, symmetric.LinearResponse):
-            yield r.A, r.B, np.zeros((2, 2))
-            return
+        P, Q, W = r.P[-2:], r.Q[-2:], r.W[-2:]   # of the output shafts
         corners = itertools.product((-1.0, 0.0, 1.0), repeat=2)
         for shares in ([(0.0, 0.0)] if self._lagged else corners):
             X = np.diag(np.multiply(shares, self._phi))   # F = X M + the rest
-            K = r.C @ np.linalg.inv(np.eye(2) + X @ r.W)
-            yield r.A - K @ X @ r.P, r.B - K @ X @ r.Q, K
+            K = r.C @ np.linalg.inv(np.eye(2) + X @ W)
+            yield r.A - K @ X @ P, r.B - K @ X @ Q, K
 
     def norm(self, x):
         """Return |v|, the root of twice the kinetic energy."""
@@ -202,21 +217,22 @@ class Bound:
 class Tally:
     """What was counted over many cases, and the worst that was seen."""
 
-    def __init__(self, loss_law):
-        self.loss_law = loss_law
+    def __init__(self, loss_law, clutched=False):
+        self.loss_law, self.clutched = loss_law, clutched
         self.cases = self.ticks = self.coarse_cases = self.coarse_steps = 0
         self.residual = 0.0   # of a constraint, over its largest term
         self.fullest = 0.0    # speeds, or energy, over what may be
 
     def __str__(self):
-        return (f'{self.loss_law}: {self.cases} cases, {self.ticks} ticks, '
+        which = ', symmetric with clutches' if self.clutched else ''
+        return (f'{self.loss_law}{which}: {self.cases} cases, {self.ticks} ticks, '
                 f'{self.coarse_steps} coarse steps in {self.coarse_cases} cases, '
                 f'worst constraint residual {self.residual:.1e} of '
                 f'its largest term, up to {self.fullest:.6f} of what energy allows')
 
     def run(self, n):
         """Run case n; raise AssertionError, with the case, whatever goes wrong."""
-        case = random_case(n)
+        case = random_case(n, self.clutched)
         try:
             if self.loss_law == PAPER:
                 self._run(*case)
@@ -281,8 +297,8 @@ class Tally:
             residual = largest_residual(g, values)
             assert residual < ROUNDING, (residual, values)
             self.residual = max(self.residual, residual)
-        if len(snapshot.moment) == 4:   # friction opposes slip; the satellite turns with the rear
-            _, _, front, rear = snapshot.moment
+        if len(snapshot.moment) > 3:   # friction opposes slip; the satellite turns with the rear
+            *_, front, rear = snapshot.moment
             slip = -snapshot.velocity[-1]
             assert front * slip >= 0.0 >= rear * slip, (front, rear, slip)
 
@@ -311,17 +327,22 @@ def independent(snapshot, p):
 # One state
 
 
-def random_state(rng, symmetric):
+RANDOM = {'symmetric': random_symmetric, 'lsd': random_self_locking,
+          'symmetric with clutches': random_clutched_symmetric}
+
+
+def random_state(rng, kind):
     """Return random parameters, (carrier speed, slip) and torques, on every side of every kink."""
-    p = (random_symmetric if symmetric else random_self_locking)(rng)
+    p = RANDOM[kind](rng)
     p = dataclasses.replace(p, sign_speed=power_of_ten(rng, -3, 1))
     y = tuple(rng.choice([-1.0, 1.0]) * power_of_ten(rng, -3, 2) for _ in range(2))
     return p, y, rng.normal(0, 200, 3) * (rng.random(3) < 0.85)
 
 
-def check_state(rng, symmetric):
+def check_state(rng, kind):
     """Check that a random state has one solution, which loses power and keeps the symmetries."""
-    p, (w, s), T = random_state(rng, symmetric)
+    p, (w, s), T = random_state(rng, kind)
+    symmetric = kind != 'lsd'
     flow = PassiveFlow(p, T)
     k, u, point = flow.k, flow.u, flow.point(w, s)
     k_1s, k_2s = k.k_1 * s, k.k_2 * s

@@ -44,13 +44,20 @@ ASSUMED = {
     'lsd.clutch.front.preload': 100,
     'lsd.clutch.rear.preload': 100,
 }
+PLATES = {   # the paper's symmetric differential has no clutches
+    'symmetric.pressure_angle': 20 * math.pi / 180,
+    'symmetric.side_gear_radius': 0.03,
+    **{f'symmetric.clutch.{side}.{name}': value for side in ('left', 'right')
+       for name, value in (('friction_coefficient', 0.15), ('slip_steepness', 4),
+                           ('radius', 0.05), ('preload', 0))}
+}
+NO_PLATES = {f'symmetric.clutch.{side}.friction_surfaces': 0 for side in ('left', 'right')}
 ACTUATED = {   # clutches as the paper has them, without any lag
-    'lsd.clutch.front.coast_factor': 1,
-    'lsd.clutch.rear.coast_factor': 1,
-    'lsd.clutch.front.actuator_time_constant': 0,
-    'lsd.clutch.rear.actuator_time_constant': 0,
-    'lsd.clutch.front.actuator_limit': 1e6,
-    'lsd.clutch.rear.actuator_limit': 1e6,
+    f'{clutch}.{name}': value
+    for clutch in ('lsd.clutch.front', 'lsd.clutch.rear', 'symmetric.clutch.left',
+                   'symmetric.clutch.right')
+    for name, value in (('coast_factor', 1), ('actuator_time_constant', 0),
+                        ('actuator_limit', 1e6))
 }
 TABLE_2 = {
     'lsd.satellite_ratio': 10 / 24,
@@ -84,9 +91,10 @@ def owner(name):
 
 
 @pytest.mark.parametrize('table, values', [
-    (SymmetricParameters, TABLE_1), (SelfLockingParameters, TABLE_2 | ASSUMED | ACTUATED)])
+    (SymmetricParameters, TABLE_1 | PLATES | NO_PLATES),
+    (SelfLockingParameters, TABLE_2 | ASSUMED)])
 def test_defaults_are_those_of_the_paper(table, values):
-    values = {**values, f'{table.prefix}.mesh_sign_speed': SIGN_SPEED}
+    values = {**values, **table.part_of(ACTUATED), f'{table.prefix}.mesh_sign_speed': SIGN_SPEED}
     assert table().named() == pytest.approx(values, rel=1e-15)
     for name, value in table().named().items():
         assert type(value) is (int if name.endswith(('count', 'surfaces')) else float), name
@@ -101,7 +109,8 @@ def test_ratio_of_the_crown_gears_and_the_preload_friction_are_those_of_the_pape
 
 def test_just_what_the_paper_does_not_name_is_described_as_assumed():
     rows = dict(SelfLockingParameters.rows().values()) | dict(SymmetricParameters.rows().values())
-    assert {name for name, row in rows.items() if 'assumed' in row.description} == set(ASSUMED)
+    assumed = {name for name, row in rows.items() if 'assumed' in row.description}
+    assert assumed == set(ASSUMED | PLATES)
 
 
 @pytest.mark.parametrize('table', TABLES)

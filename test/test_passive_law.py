@@ -18,7 +18,7 @@ from mechanisms import (
     symmetric_lagrange,
 )
 import numpy as np
-from properties import check_state, random_state
+from properties import check_state, RANDOM, random_state
 import pytest
 from scipy.optimize import brentq
 
@@ -26,13 +26,23 @@ from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIA
 from dm_ros.energy import AuditedSimulation, rated_efficiency
 from dm_ros.mechanism import clutched, passive
 from dm_ros.mechanism.self_locking import SelfLockingDae, SelfLockingLagged, SelfLockingOde
-from dm_ros.mechanism.symmetric import SymmetricDae, SymmetricOde
+from dm_ros.mechanism.symmetric import in_slip, SymmetricDae, SymmetricOde
 from dm_ros.mechanism.variants import variant_named
 
 EACH_VARIANT = pytest.mark.parametrize('variant', VARIANTS)
-MECHANISMS = pytest.mark.parametrize('symmetric', [True, False], ids=['symmetric', 'lsd'])
-FORMULATIONS = [SymmetricOde, SymmetricDae, SelfLockingLagged, SelfLockingOde, SelfLockingDae]
-EACH_FORMULATION = pytest.mark.parametrize('formulation', FORMULATIONS)
+EACH_KIND = pytest.mark.parametrize('kind', RANDOM)
+FORMULATIONS = {
+    SymmetricOde: ('symmetric', 'symmetric with clutches'),
+    SymmetricDae: ('symmetric', 'symmetric with clutches'),
+    SelfLockingLagged: ('lsd',), SelfLockingOde: ('lsd',), SelfLockingDae: ('lsd',)}
+EACH_FORMULATION = pytest.mark.parametrize('formulation, kind', [
+    (formulation, kind) for formulation, kinds in FORMULATIONS.items() for kind in kinds])
+
+
+def paper_response(formulation, p, flow):
+    """Return the response of a formulation in (w, s)."""
+    response = formulation(p).response(flow)
+    return in_slip(response) if formulation in (SymmetricOde, SymmetricDae) else response
 
 # by a root finder in extended precision, with mesh_sign_speed 0.1: speeds of the outputs, torques,
 # accelerations of carrier and outputs, moments in the order of ``Simulation.moments``
@@ -91,7 +101,8 @@ def accelerations(k, point):
 def moments(k, point):
     """Return the moments in the order of ``Simulation.moments``."""
     _, _, F_1, F_2, M_1, M_2, M_F, *_ = point
-    return np.array([M_F, M_1, M_2] if k.g_F else [M_1, M_2, F_1, F_2])
+    own = [M_F, M_1, M_2] if k.g_F else [M_1, M_2]
+    return np.array([*own, F_1, F_2] if k.a_1 else own)
 
 
 @pytest.mark.parametrize('kind, points', [(SymmetricParameters, SYMMETRIC_POINTS),
@@ -108,10 +119,11 @@ def test_accelerations_and_moments_are_those_of_a_root_finder(kind, points):
 # Where all local powers agree it is the law of the paper
 
 
-def agreeing(rng, symmetric, direction):
+def agreeing(rng, kind, direction):
     """Return random parameters, output speeds and torques of a flow in which all powers agree."""
+    symmetric = kind != 'lsd'
     while True:
-        p = (random_symmetric if symmetric else random_self_locking)(rng)
+        p = RANDOM[kind](rng)
         sign = rng.choice([-1.0, 1.0])
         w_1, w_2 = sign * rng.uniform(5, 100) * rng.uniform(0.7, 1.4, 2)
         size = direction * sign * rng.uniform(10, 400)
@@ -135,11 +147,10 @@ def agreeing(rng, symmetric, direction):
 
 @pytest.mark.parametrize('direction', [1, -1])
 @EACH_FORMULATION
-def test_where_all_powers_agree_it_is_the_law_of_the_paper(formulation, direction):
-    symmetric = formulation in FORMULATIONS[:2]
-    rng, states = np.random.default_rng(1), 0
+def test_where_all_powers_agree_it_is_the_law_of_the_paper(formulation, kind, direction):
+    rng, states, friction = np.random.default_rng(1), 0, None
     while states < 2000:
-        p, (w, s), T, flow = agreeing(rng, symmetric, direction)
+        p, (w, s), T, flow = agreeing(rng, kind, direction)
         if formulation is SelfLockingLagged:   # the friction of a step before
             M = np.abs(rng.normal(0, 100, 2))
             friction = tuple(np.array(clutched.full_friction(p)[0]) * M
@@ -149,16 +160,12 @@ def test_where_all_powers_agree_it_is_the_law_of_the_paper(formulation, directio
                 continue
         states += 1
         point = flow.point(w, s)
-        if symmetric:
-            r, outputs = formulation(p).response(direction), accelerations(flow.k, (w, s))[1:]
-            e_1, e_2 = r.A @ outputs + r.B @ T
-            expected = (e_1 + e_2) / 2, e_1, e_2
-            expected_moments = direction * (r.P @ outputs + r.Q @ T)
-        else:
-            frozen = friction if formulation is SelfLockingLagged else None
-            paper = Flow(p, T, direction, frozen, formulation).point(w, s)
-            expected = accelerations(flow.k, paper)
-            expected_moments = [direction * paper[4], direction * paper[5], paper[2], paper[3]]
+        r = paper_response(formulation, p, direction)
+        paper = Flow(p, T, direction, friction, r).point(w, s)
+        expected = accelerations(flow.k, paper)
+        expected_moments = direction * (r.P @ (w, s) + r.Q @ T - r.W @ paper[2:4])
+        if p.has_clutches:
+            expected_moments = [*expected_moments, *paper[2:4]]
         # the terms that add up to an acceleration are as large as torque over inertia
         size = np.abs(T).max() / min(p.I_0, p.I_1, p.I_2) / 100
         error = np.abs(accelerations(flow.k, point) - expected).max()
@@ -167,47 +174,37 @@ def test_where_all_powers_agree_it_is_the_law_of_the_paper(formulation, directio
 
 
 @EACH_FORMULATION
-def test_it_stands_in_the_matrices_of_the_paper_with_its_own_efficiencies(formulation):
-    symmetric = formulation in FORMULATIONS[:2]
+def test_it_stands_in_the_matrices_of_the_paper_with_its_own_efficiencies(formulation, kind):
     rng = np.random.default_rng(2)
     for _ in range(500):
-        p, y, T = random_state(rng, symmetric)
+        p, y, T = random_state(rng, kind)
         flow = PassiveFlow(p, T)
         k, point = flow.k, flow.point(*y)
-        response = formulation(p).response(passive.efficiencies(k, T[0], point))
+        r = paper_response(formulation, p, passive.efficiencies(k, T[0], point))
         (_, _, sigma_0, sigma_1, sigma_2, _, _), (s_1, s_2, s_F, _, _) = point[8], point[7]
         n = np.array([k.mean_F + k.half_F * sigma_0 * s_F, k.mean_1 + k.half_1 * sigma_1 * s_1,
                       k.mean_2 + k.half_2 * sigma_2 * s_2])
-        if symmetric:
-            outputs = accelerations(k, y)[1:]
-            expected = accelerations(k, point)[1:]
-            e, N = response.A @ outputs + response.B @ T, response.P @ outputs + response.Q @ T
-            M, got = moments(k, point), N / n
-        else:
-            F = np.array(point[2:4])
-            expected = point[:2]
-            e = response.A @ y + response.B @ T - response.C @ F
-            N = response.P @ y + response.Q @ T - response.W @ F
-            M, got = point[4:6], N / n[1:]
-        assert relative_difference(e, expected) < 1e-11
-        assert relative_difference(got, M) < 1e-10
+        F, meshes = np.array(point[2:4]), len(r.P)
+        e, N = r.A @ y + r.B @ T - r.C @ F, r.P @ y + r.Q @ T - r.W @ F
+        assert relative_difference(e, point[:2]) < 1e-11
+        assert relative_difference(N / n[-meshes:], moments(k, point)[:meshes]) < 1e-10
 
 
 # Identities
 
 
-@MECHANISMS
-def test_at_any_state_there_is_one_solution_that_loses_and_has_the_symmetries(symmetric):
+@EACH_KIND
+def test_at_any_state_there_is_one_solution_that_loses_and_has_the_symmetries(kind):
     rng = np.random.default_rng(3)
     for _ in range(600):
-        check_state(rng, symmetric)
+        check_state(rng, kind)
 
 
-@MECHANISMS
-def test_torque_and_moments_grow_together_without_drag_and_preload(symmetric):
+@EACH_KIND
+def test_torque_and_moments_grow_together_without_drag_and_preload(kind):
     rng = np.random.default_rng(4)
     for _ in range(100):
-        p, y, T = random_state(rng, symmetric)
+        p, y, T = random_state(rng, kind)
         T += 1e-3   # not all zero
         nothing = {f.name: 0.0 for f in dataclasses.fields(p) if f.name.startswith(('l_', 'N_'))}
         p = dataclasses.replace(p, **nothing)
@@ -215,17 +212,18 @@ def test_torque_and_moments_grow_together_without_drag_and_preload(symmetric):
         assert relative_difference(np.array(one[:7]) * 10, ten[:7]) < 1e-12
 
 
-@MECHANISMS
-def test_without_losses_it_is_lagrange_whatever_the_sign_speed(symmetric):
+@EACH_KIND
+def test_without_losses_it_is_lagrange_whatever_the_sign_speed(kind):
     rng = np.random.default_rng(5)
     for _ in range(200):
-        p, y, T = random_state(rng, symmetric)
+        p, y, T = random_state(rng, kind)
         p = lossless(p)
         flow = PassiveFlow(p, T)
         point = flow.point(*y)
         _, *outputs = accelerations(flow.k, y)
-        expected = (symmetric_lagrange(p, np.array(outputs), (T[1], T[2], T[0])) if symmetric
-                    else self_locking_lagrange(p, np.array(outputs), T, point[2:4]))
+        outputs, F = np.array(outputs), point[2:4]
+        expected = (self_locking_lagrange(p, outputs, T, F) if kind == 'lsd'
+                    else symmetric_lagrange(p, outputs, (T[1], T[2], T[0]), F))
         assert relative_difference(accelerations(flow.k, point)[1:], expected) < 1e-11
 
 

@@ -26,9 +26,10 @@ EACH_VARIANT = pytest.mark.parametrize('variant', VARIANTS)
 # Random cases
 
 
+@pytest.mark.parametrize('clutched', [False, True])
 @pytest.mark.parametrize('loss_law', LOSS_LAWS)
-def test_no_random_differential_breaks_a_law_or_fails(loss_law):
-    tally = Tally(loss_law)
+def test_no_random_differential_breaks_a_law_or_fails(loss_law, clutched):
+    tally = Tally(loss_law, clutched)
     for n in range(250):
         tally.run(n)
     assert tally.cases == 250

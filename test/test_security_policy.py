@@ -61,7 +61,7 @@ def test_the_policy_grants_what_the_node_uses_and_nothing_more(monkeypatch):
         context = rclpy.Context()
         rclpy.init(context=context, domain_id=domain)
         try:
-            for options in ({'variant': 'symmetric_ode'}, {'variant': 'lsd_ode'},
+            for options in ({'symmetric.clutch.left.friction_surfaces': 2}, {'variant': 'lsd_ode'},
                             {'mode': 'lockstep'}, {'use_sim_time': True},
                             {'publish_clock': True}):
                 node = DifferentialNode(context=context, parameter_overrides=[

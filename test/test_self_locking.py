@@ -26,7 +26,7 @@ from dm_ros import SelfLockingParameters
 from dm_ros.mechanism import losses, self_locking
 from dm_ros.mechanism.clutched import full_friction, solve_moments
 from dm_ros.mechanism.self_locking import SelfLockingDae, SelfLockingLagged, SelfLockingOde
-from dm_ros.motion.models import SelfLockingModel
+from dm_ros.motion.models import ClutchedModel
 
 FORMULATIONS = [SelfLockingLagged, SelfLockingOde, SelfLockingDae]
 IDENTITY = 1e-12   # relative: rounding
@@ -238,7 +238,7 @@ def test_moments_solve_their_equation_also_where_they_vanish(direction):
 @pytest.mark.parametrize('direction', BOTH)
 def test_lagged_friction_is_that_of_the_given_moments(direction):
     for p, w, T, _ in random_flows(direction, 200, seed=7):
-        model, before = SelfLockingModel(SelfLockingLagged, p, 1e-3), (12.0, 34.0)
+        model, before = ClutchedModel(SelfLockingLagged, p, 1e-3), (12.0, 34.0)
         _, _, end, _, point, _, _ = model.step(
             tuple(slip_state(p, w)), model.friction(before, (0.0, 0.0)), tuple(T), direction)
         g = p.R_2 / p.R_1

@@ -28,7 +28,7 @@ def replacing(path, mode):
     except BaseException as error:
         with suppress(OSError):
             os.unlink(unfinished)
-        # of the user's file shall be told: none is named on a full disk, ours where none can be made
+        # a full disk names no file, a folder that takes none that of ours
         if isinstance(error, OSError) and error.filename in (None, unfinished):
             raise OSError(error.errno, error.strerror, path) from None
         raise

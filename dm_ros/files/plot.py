@@ -17,6 +17,7 @@ COLORS = {   # a shaft has one colour in all panels, and its moment as well
     'final_drive': '#222222', 'left_mesh': '#1f6fb5', 'right_mesh': '#d1441f',
     'front_mesh': '#1f6fb5', 'rear_mesh': '#d1441f',
     'front_clutch': '#8ab8de', 'rear_clutch': '#eda58f',
+    'left_clutch': '#8ab8de', 'right_clutch': '#eda58f',
 }
 
 

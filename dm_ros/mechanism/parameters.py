@@ -100,9 +100,9 @@ def mesh_sign_speed():
                'passive law: speed of a shaft at which its mesh takes three quarters of its loss')
 
 
-def pressure_angle():
+def pressure_angle(source=''):
     return row('pressure_angle', math.radians(20.0), 'rad', 0.0, 1.5,
-               'gearing angle; 0 takes away the load-proportional friction')
+               f'gearing angle; 0 takes away the load-proportional friction{source}')
 
 
 def satellite_count(default):
@@ -158,14 +158,14 @@ def clutch(shaft, symbol):
     """Return the row of one clutch parameter, given by its symbol without the shaft number."""
     surfaces, radius, preload = {'front': (1, 0.040, 100.0), 'rear': (9, 0.060, 100.0),
                                  'left': (0, 0.050, 0.0), 'right': (0, 0.050, 0.0)}[shaft]
-    name = f'clutch.{shaft}'
+    name, source = f'clutch.{shaft}', '' if shaft in ('front', 'rear') else f' ({ASSUMED})'
     return {
         'n_F': row(f'{name}.friction_surfaces', surfaces, '1', 0, 1000,
                    f'number of friction surfaces of the {shaft} clutch', kind=int),
         'mu': row(f'{name}.friction_coefficient', 0.15, '1', 0.0, 10.0,
-                  f'friction coefficient of the {shaft} clutch'),
+                  f'friction coefficient of the {shaft} clutch{source}'),
         'c_f': row(f'{name}.slip_steepness', 4.0, 's/rad', 0.0, 1e4,
-                   f'steepness of the {shaft} clutch friction over slip, tanh(c_f slip)'),
+                   f'steepness of the {shaft} clutch friction over slip, tanh(c_f slip){source}'),
         'R_F': row(f'{name}.radius', radius, 'm', 0.0, 10.0,
                    f'mean friction radius of the {shaft} clutch ({ASSUMED})', above_low=True),
         'N': row(f'{name}.preload', preload, 'N', 0.0, 1e6,
@@ -250,7 +250,7 @@ class SymmetricParameters(ClutchedParameters):
     eta_1G: float = efficiency('left_mesh', 0.99)
     eta_2G: float = efficiency('right_mesh', 0.99)
     sign_speed: float = mesh_sign_speed()
-    alpha: float = pressure_angle()
+    alpha: float = pressure_angle(f' ({ASSUMED})')
     R: float = row('side_gear_radius', 0.03, 'm', 0.0, 10.0,
                    f'radius of the side gears ({ASSUMED}); it counts where there are clutches',
                    above_low=True)

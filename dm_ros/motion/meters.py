@@ -350,7 +350,8 @@ class PassiveMeter:
 
 
 METERS = {SymmetricModel: SymmetricMeter, ClutchedModel: ClutchedMeter,
-          ClutchedSymmetricModel: ClutchedSymmetricMeter, PassiveModel: PassiveMeter, PassiveSymmetricModel: PassiveMeter}
+          ClutchedSymmetricModel: ClutchedSymmetricMeter, PassiveModel: PassiveMeter,
+          PassiveSymmetricModel: PassiveMeter}
 
 
 def meter_of(model):

@@ -41,7 +41,7 @@ SWITCH_INTERVAL = 1e-4   # s that the loop waits at most for a service to let go
 
 HELP = """\
 A vehicle differential in real time: torques in as topics, speeds and internal moments out.
-Where it has clutches (lsd_*) axial forces press them.
+Where it has clutches (lsd_*, and symmetric_* with friction surfaces) axial forces press them.
 
   in   ~/torque/<shaft>     std_msgs/Float64          N m, one shaft
        ~/clutch/<clutch>    std_msgs/Float64          N, axial force on one clutch

@@ -17,7 +17,7 @@ from sensor_msgs.msg import JointState
 
 from dm_ros.ending import ignore_signals, run_command
 from dm_ros.files.torque_table import read_torque_file
-from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS
+from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS, WITH_CLUTCHES
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
@@ -125,13 +125,12 @@ def load(arguments):
     rate, count = arguments.rate, None
     mechanism = (MECHANISMS[arguments.profile] if arguments.profile
                  else variant_named(arguments.variant).mechanism)
-    names = mechanism.inputs
+    names, clutches = mechanism.inputs, WITH_CLUTCHES[mechanism.name].clutch_moments
     if arguments.torques:
-        held = read_torque_file(arguments.torques, mechanism.inputs,
-                                mechanism.clutch_moments).held(1 / rate)
+        held = read_torque_file(arguments.torques, names, clutches).held(1 / rate)
         torques_at, count = held.at, len(held)
         if len(torques_at(0)) > len(names):
-            names += mechanism.clutch_moments
+            names += clutches
     else:
         def torques_at(n):
             return mechanism.load(n / rate)

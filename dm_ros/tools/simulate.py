@@ -28,10 +28,11 @@ from dm_ros.tools.progress import progress
 EPILOG = """\
 IN.csv has a header "time,<shaft>,..." with every input shaft of the variant, in any order
 (symmetric: pinion, left, right; lsd: carrier, front, rear), then rows of s and N m. Columns
-<clutch>_clutch may be added, forces on the clutches in N (lsd: front_clutch, rear_clutch). A row's
-torques and forces hold until the time of the next row; before the first row they are zero; the
-time of the last row ends the run, which begins at time 0. Each tick takes what is in force at its
-start; a time less than 1/1000 of a tick after that start counts as on it.
+<clutch>_clutch may be added, forces on the clutches in N (lsd: front_clutch, rear_clutch;
+symmetric with friction surfaces: left_clutch, right_clutch). A row's torques and forces hold until
+the time of the next row; before the first row they are zero; the time of the last row ends the
+run, which begins at time 0. Each tick takes what is in force at its start; a time less than 1/1000
+of a tick after that start counts as on it.
 
 OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), torque.<input>
 (N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse), clutch_force.<clutch> (N): a row

@@ -8,7 +8,9 @@ import math
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
+from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int8
 from std_srvs.srv import SetBool, Trigger
@@ -76,6 +78,38 @@ def test_a_tick_in_lockstep_is_that_of_the_library_with_slip_and_force_on_clutch
             assert tuple(slips) == (front - carrier, rear - carrier)
         assert message.header.stamp == joints[-1].header.stamp == moments[-1].header.stamp
     assert any(clutches[-1].velocity)
+
+
+PLATES = {f'symmetric.clutch.{side}.{name}': value for side in ('left', 'right')
+          for name, value in (('friction_surfaces', 4), ('friction_coefficient', 0.1),
+                              ('preload', 80.0))}
+
+
+def test_an_axle_with_plates_takes_forces_and_reports_its_clutches(ros):
+    ros.differential('symmetric_dae', mode='lockstep', rate=500.0, **{
+        name.replace('.', '__'): value for name, value in PLATES.items()})
+    moments = ros.listen(JointState, '/differential/internal_moments')
+    clutches = ros.listen(JointState, '/differential/clutches')
+    publisher = ros.publisher(JointState, TORQUES)
+    simulation = Simulation('symmetric_dae', 1 / 500.0, PLATES)
+    for n in range(1, 31):
+        (_, left, right), forces = load(n)
+        publisher.publish(demand((90.0, left, right, *forces), (
+            'pinion', 'left', 'right', 'left_clutch', 'right_clutch')))
+        ros.until(lambda n=n: len(clutches) == len(moments) == n)
+        snapshot = simulation.step((90.0, left, right), forces)
+        assert tuple(moments[-1].effort) == snapshot.moment
+        assert tuple(clutches[-1].effort) == snapshot.clutch_force
+    assert list(moments[-1].name)[3:] == list(clutches[-1].name) == ['left_clutch', 'right_clutch']
+    assert any(snapshot.moment[3:])
+
+
+def test_an_axle_without_plates_gets_none_while_it_runs(ros):
+    ros.differential('symmetric_ode')
+    response = ros.call(SetParameters, '/differential/set_parameters', parameters=[
+        Parameter('symmetric.clutch.left.friction_surfaces', value=2).to_parameter_msg()])
+    result, = response.results
+    assert not result.successful and 'at the start' in result.reason
 
 
 def test_the_moment_of_a_clutch_follows_its_force_in_the_same_tick(ros):
