@@ -230,7 +230,7 @@ def draw_wheels(ax, run):
     _, left, right, *_ = record.velocity.values()
     ax.plot(record.time, left, color=LEFT, label='left, on ice')
     ax.plot(record.time, right, color=RIGHT, label='right, on asphalt')
-    ax.set_title(f'{case.title}\nslip up to {abs(record.slip).max():.1f} rad/s; '
+    ax.set_title(f'{case.title}\nslip ≤ {abs(record.slip).max():.1f} rad/s; '
                  f'brakes, clutches {sum(heat.values()) / 1e3:.1f} kJ', fontsize='medium')
 
 
