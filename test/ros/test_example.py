@@ -118,14 +118,14 @@ def test_the_command_draws_the_picture(tmp_path):
 
 
 def test_the_limited_slip_runs_beside_a_node_in_real_time_and_its_end_opens_the_clutches(ros):
-    ros.differential('lsd_ode', rate=200.0, torque_timeout=0.5, **{
+    node = ros.differential(ELS.variant, rate=200.0, torque_timeout=0.5, **{
         name.replace('.', '__'): value for name, value in brake_lock.parameters_of(ELS).items()})
     clutches = ros.listen(JointState, '/differential/clutches')
     torques = ros.publisher(JointState, '/differential/torques')
 
     def force_with_torque():
-        """Return the forces while the front wheel has no grip."""
-        torques.publish(JointState(name=['carrier', 'front', 'rear'], effort=[300.0, 0.0, -150.0]))
+        """Return the forces while the left wheel has no grip."""
+        torques.publish(JointState(name=node.simulation.inputs, effort=[300.0, 0.0, -150.0]))
         return clutches[-1].effort if clutches else [0.0, 0.0]
 
     with Forked(LIMITED_SLIP, '--ros-args', '-p', 'limit:=500.0') as controller:
