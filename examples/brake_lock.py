@@ -2,22 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A brake-based differential lock: a car on a hill with its left wheel on ice, in three cases.
+What helps a car on a hill with its left wheel on ice: a brake, plates, clutches; four cases.
 
 open    the open differential: the wheel on ice spins up and the car hardly moves
 brake   the same, and a controller brakes the spinning wheel: torque reaches the other one
-lsd     the self-locking differential as an axle differential, and no controller
+lsd     the self-locking differential as an axle differential: plates, and no controller
+els     electronic limited slip: a controller presses clutches, which are open without it
 
 The differential, the car and the controller are ROS 2 nodes in lockstep, one message a tick.
 With --direct the same classes call each other, to the same bits.
 """
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 import sys
 from typing import NamedTuple
 
-from car import BrakeLock, Car, CarParameters, final_drive_ratio, with_wheels_and_engine
+from car import (
+    BrakeLock,
+    Car,
+    CarParameters,
+    final_drive_ratio,
+    LimitedSlip,
+    with_wheels_and_engine,
+)
 import numpy as np
 
 from dm_ros.files.record import Record
@@ -26,19 +35,29 @@ from dm_ros.testing import DirectDifferential, LockstepDifferential
 RATE = 1000.0   # Hz
 
 
-class Case(NamedTuple):
-    """A differential, with or without the lock."""
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A differential in the car, and its controller."""
 
     name: str
     variant: str
-    braked: bool
     title: str
+    controller: type = None   # BrakeLock or LimitedSlip
+    parameters: tuple = ()    # of (name, value), beside those of wheels and engine
 
 
+# An axle with equal gears and clutches that are open but for their actuators.
+DRIVEN_CLUTCHES = (
+    ('lsd.crown_radius.front', 0.06),
+    ('lsd.pressure_angle', 0.0),
+    *((f'lsd.clutch.{clutch}.{name}', value) for clutch in ('front', 'rear') for name, value in (
+        ('friction_surfaces', 5), ('radius', 0.06), ('preload', 0.0),
+        ('actuator_time_constant', 0.05))))
 CASES = (
-    Case('open', 'symmetric_ode', False, 'open differential'),
-    Case('brake', 'symmetric_ode', True, 'open differential, brake lock'),
-    Case('lsd', 'lsd_ode', False, 'self-locking differential'),
+    Case('open', 'symmetric_ode', 'open differential'),
+    Case('brake', 'symmetric_ode', 'brake lock', BrakeLock),
+    Case('lsd', 'lsd_ode', 'self-locking, plates'),
+    Case('els', 'lsd_ode', 'electronic limited slip', LimitedSlip, DRIVEN_CLUTCHES),
 )
 
 
@@ -47,12 +66,13 @@ class Run(NamedTuple):
 
     case: Case
     record: Record
-    car: dict   # arrays: speed (m/s), left_brake and right_brake (N m)
+    car: dict    # arrays: speed (m/s), left_brake and right_brake (N m)
+    heat: dict   # J: of the brakes and of the clutches
 
 
 def parameters_of(case, p=None):
     """Return the parameters that the differential of a case has in the car."""
-    return with_wheels_and_engine(case.variant, p or CarParameters())
+    return {**with_wheels_and_engine(case.variant, p or CarParameters()), **dict(case.parameters)}
 
 
 def make_car(case, rate=RATE, p=None):
@@ -63,25 +83,36 @@ def make_car(case, rate=RATE, p=None):
 def attach(differential, case, rate=RATE, p=None):
     """Attach the nodes of a case to a ``LockstepDifferential``; return the ``Car``."""
     from car_nodes import BrakeLockNode, CarNode  # only those who use topics need ROS
+    from limited_slip import LimitedSlipNode
 
     car, inputs = make_car(case, rate, p), differential.simulation.inputs
-    differential.attach(CarNode(car, inputs, case.braked, context=differential.context))
-    if case.braked:
-        differential.attach(BrakeLockNode(
-            BrakeLock(1.0 / rate), inputs[1:], context=differential.context))
+    context, demands = differential.context, None
+    if case.controller is BrakeLock:
+        demands = 'brake_demands'
+        differential.attach(BrakeLockNode(BrakeLock(1.0 / rate), inputs[1:], context=context))
+    elif case.controller is LimitedSlip:
+        demands = 'clutch_demands'
+        differential.attach(LimitedSlipNode(demands, context=context))
+    differential.attach(CarNode(car, inputs, demands, context=context))
     return car
 
 
 def law_of(differential, case, rate=RATE, p=None):
     """Return the law for a ``DirectDifferential`` that does the same, and its ``Car``."""
-    car, lock = make_car(case, rate, p), BrakeLock(1.0 / rate)
+    car, lock, limited_slip = make_car(case, rate, p), BrakeLock(1.0 / rate), LimitedSlip()
     simulation = differential.simulation
-    drive, left, right = (simulation.shafts.index(name) for name in simulation.inputs)
+    index = simulation.shafts.index
+    drive, left, right = map(index, simulation.inputs)
+    carrier, clutched = index('carrier'), tuple(map(index, simulation.clutches))
 
     def law(snapshot):
-        wheels = snapshot.velocity[left], snapshot.velocity[right]
-        demands = lock.brakes(wheels) if case.braked else (0.0, 0.0)
-        return car.torques(snapshot.velocity[drive], wheels, demands)
+        speeds = snapshot.velocity
+        wheels = speeds[left], speeds[right]
+        brakes = lock.brakes(wheels) if case.controller is BrakeLock else (0.0, 0.0)
+        torques = car.torques(speeds[drive], wheels, brakes)
+        if case.controller is not LimitedSlip:
+            return torques
+        return torques, tuple(limited_slip.force(speeds[k] - speeds[carrier]) for k in clutched)
     return law, car
 
 
@@ -101,20 +132,30 @@ def run(case, seconds, direct=False):
 def as_run(case, record, car):
     """Return the ``Run`` of a record and of the car that made its torques."""
     # the car is at the start of each tick; it may already have answered the last state
-    _, speed, left_brake, right_brake = np.array(car.history[:len(record)]).T
-    return Run(case, record, {
-        'speed': speed, 'left_brake': left_brake, 'right_brake': right_brake})
+    _, speed, *brakes = np.array(car.history[:len(record)]).T
+    _, *wheels = (record.velocity[name] for name in record.torque)
+    powers = {
+        'brakes': [brake * np.tanh(wheel / car.p.brake_soft_speed) * wheel
+                   for brake, wheel in zip(brakes, wheels)],
+        'clutches': [moment * (record.velocity[shaft] - record.velocity['carrier'])
+                     for shaft, moment in clutch_moments(record).items()]}
+    return Run(case, record, dict(zip(('speed', 'left_brake', 'right_brake'), (speed, *brakes))),
+               {name: float(np.sum(values)) * car.dt for name, values in powers.items()})
 
 
 def report(runs):
     """Return a table of the cases as lines."""
-    lines = [f'{"":8}{"car":>8}{"greatest slip":>17}{"left brake":>14}{"right tyre":>14}',
-             f'{"":8}{"m/s":>8}{"rad/s":>17}{"N m":>14}{"N m":>14}']
-    for case, record, car in runs:
+    lines = [f'{"":8}{"car":>6}{"slip":>8}{"left brake":>12}{"right tyre":>12}{"clutch":>8}'
+             f'{"brakes":>8}{"clutches":>10}',
+             f'{"":8}{"m/s":>6}{"rad/s":>8}{"N m":>12}{"N m":>12}{"kN":>8}{"kJ":>8}{"kJ":>10}']
+    for case, record, car, heat in runs:
         _, _, right = record.torque.values()
-        lines.append(f'{case.name:8}{car["speed"][-1]:8.2f}{abs(record.slip).max():17.1f}'
-                     f'{car["left_brake"].max():14.0f}{-right.min():14.0f}')
-    return [*lines, 'speed at the end, the greatest of the rest']
+        force = max((values.max() for values in record.clutch_force.values()), default=0.0)
+        lines.append(f'{case.name:8}{car["speed"][-1]:6.2f}{abs(record.slip).max():8.1f}'
+                     f'{car["left_brake"].max():12.0f}{-right.min():12.0f}{force / 1e3:8.1f}'
+                     f'{heat["brakes"] / 1e3:8.1f}{heat["clutches"] / 1e3:10.1f}')
+    return [*lines, '', 'speed at the end; the greatest slip, torques and force of an actuator; '
+            'all heat']
 
 
 def meshes(record):
@@ -122,69 +163,98 @@ def meshes(record):
     return [values for name, values in record.moment.items() if name.endswith('_mesh')]
 
 
+def clutch_moments(record):
+    """Return the moments of the clutches, N m, by the shafts on which they are."""
+    return {name.removesuffix('_clutch'): values for name, values in record.moment.items()
+            if name.endswith('_clutch')}
+
+
+LEFT, RIGHT, CONTROLLER = '#1f6fb5', '#d1441f', '#222222'   # colours
+LEFT_CLUTCH, RIGHT_CLUTCH = '#8ab8de', '#eda58f'
+CASE_COLOURS = '#888888', '#222222', '#2a8a3e', '#8e44ad'
+FORCE_SCALE = 10.0   # N of an actuator drawn as 1 N m
+
+
 def save_plot(runs, path):
     """Draw the cases side by side as PNG."""
     from matplotlib.figure import Figure
 
-    left_colour, right_colour, brake_colour = '#1f6fb5', '#d1441f', '#222222'
-    figure = Figure(figsize=(12, 9), dpi=120, layout='constrained')
+    figure = Figure(figsize=(14, 9.5), dpi=110, layout='constrained')
     figure.suptitle('Hill start, left wheel on ice, right wheel on asphalt', fontweight='bold')
+    count, end = len(runs), runs[0].record.time[-1]
     top, *rows = figure.subplot_mosaic(
-        [['car'] * 3, [f'speed{i}' for i in range(3)], [f'torque{i}' for i in range(3)]],
-        height_ratios=[1.0, 1.1, 1.3]).values()
-    speeds, torques = rows[:3], rows[3:]
-
-    for (case, record, car), colour in zip(runs, ('#888888', '#222222', '#2a8a3e')):
-        top.plot(record.time, car['speed'], color=colour, linewidth=1.8)
-        top.annotate(case.title, (record.time[-1], car['speed'][-1]), xytext=(5, 0),
-                     textcoords='offset points', va='center', color=colour)
-    top.set_ylabel('speed of the car, m/s')
-    end = runs[0].record.time[-1]
-    top.set_xlim(0.0, end * 1.22)   # room for the names
-    top.set_xticks([tick for tick in top.get_xticks() if tick <= end])
-    top.set_xlim(0.0, end * 1.22)
-
-    for ax, (case, record, _) in zip(speeds, runs):
-        _, left, right, *_ = record.velocity.values()
-        ax.plot(record.time, left, color=left_colour, label='left, on ice')
-        ax.plot(record.time, right, color=right_colour, label='right, on asphalt')
-        ax.set_title(case.title)
+        [['car'] * count, *([f'{row}{i}' for i in range(count)] for row in ('speed', 'moment'))],
+        height_ratios=[1.0, 1.1, 1.4]).values()
+    speeds, moments = rows[:count], rows[count:]
+    draw_cars(top, runs, end)
+    for ax, run in zip(speeds, runs):
+        draw_wheels(ax, run)
         ax.sharey(speeds[0])
-    for ax, (_, record, car) in zip(torques, runs):
-        left, right = meshes(record)
-        ax.plot(record.time, right, color=right_colour, linewidth=3.0, alpha=0.55,
-                label='right_mesh')
-        ax.plot(record.time, left, color=left_colour, label='left_mesh')
-        for name, colour in (('front_clutch', '#8ab8de'), ('rear_clutch', '#eda58f')):
-            if name in record.moment:
-                ax.plot(record.time, record.moment[name], color=colour, label=name)
-        if car['left_brake'].any():
-            ax.plot(record.time, car['left_brake'], color=brake_colour, linestyle='--',
-                    label='brake on the left wheel')
-        ax.sharey(torques[0])
+    for ax, run in zip(moments, runs):
+        draw_moments(ax, run)
+        ax.sharey(moments[0])
         ax.set_xlabel('time, s')
-    # the self-locking differential has front and rear in place of left and right
-    names = {'left_mesh': 'front_mesh, to the left wheel',
-             'right_mesh': 'rear_mesh, to the right wheel',
-             'rear_clutch': 'rear_clutch, negative: drives it'}
-    handles, labels = torques[2].get_legend_handles_labels()
-    torques[2].legend(handles, [names.get(label, label) for label in labels],
-                      loc='upper right', fontsize='small')
-    for ax in torques[:2]:
-        ax.legend(loc='lower right', fontsize='small')
-    speeds[0].legend(loc='center right', fontsize='small')
     speeds[0].set_ylabel('speed of the wheels, rad/s')
-    torques[0].set_ylabel('internal moments and brake, N m')
-    for ax in (top, *speeds, *torques):
+    moments[0].set_ylabel('moments and brake, N m')
+    for ax in (top, *speeds, *moments):
         ax.grid(alpha=0.25)
         ax.spines[['top', 'right']].set_visible(False)
+    for ax in (*speeds, *moments):
         ax.axhline(0.0, color='0.6', linewidth=0.6, zorder=0)
-    for ax in (*speeds, *torques):
         ax.set_xlim(0.0, end)
-    for ax in (*speeds[1:], *torques[1:]):
+    for ax in (*speeds[1:], *moments[1:]):
         ax.tick_params(labelleft=False)
-    figure.align_ylabels([top, speeds[0], torques[0]])
+    speeds[0].legend(loc='center right', fontsize='small')
+    lines = {label: line for ax in moments for line, label in zip(*ax.get_legend_handles_labels())}
+    figure.legend(lines.values(), lines, loc='outside lower center', ncols=len(lines),
+                  fontsize='small')
+    figure.align_ylabels([top, speeds[0], moments[0]])
     figure.savefig(path, format='png')
+
+
+def draw_cars(ax, runs, end):
+    """Draw the speeds of the cars, each with its name."""
+    for (case, record, car, _), colour in zip(runs, CASE_COLOURS):
+        ax.plot(record.time, car['speed'], color=colour, linewidth=1.8)
+        ax.annotate(case.title, (record.time[-1], car['speed'][-1]), xytext=(5, 0),
+                    textcoords='offset points', va='center', color=colour)
+    ax.set_ylabel('speed of the car, m/s')
+    ax.set_xlim(0.0, end * 1.16)   # room for the names
+    ax.set_xticks([tick for tick in ax.get_xticks() if tick <= end])
+    ax.set_xlim(0.0, end * 1.16)
+
+
+def draw_wheels(ax, run):
+    """Draw the speeds of the wheels; the title tells the slip and the heat."""
+    case, record, _, heat = run
+    _, left, right, *_ = record.velocity.values()
+    ax.plot(record.time, left, color=LEFT, label='left, on ice')
+    ax.plot(record.time, right, color=RIGHT, label='right, on asphalt')
+    ax.set_title(f'{case.title}\nslip ≤ {abs(record.slip).max():.1f} rad/s; '
+                 f'brakes, clutches {sum(heat.values()) / 1e3:.1f} kJ', fontsize='medium')
+
+
+def draw_moments(ax, run):
+    """Draw the moments on the shafts, and what the controller does."""
+    _, record, car, _ = run
+    left, right = meshes(record)
+    ax.plot(record.time, right, color=RIGHT, linewidth=3.0, alpha=0.55, label='gear, right shaft')
+    ax.plot(record.time, left, color=LEFT, label='gear, left shaft')
+    for moment, (colour, label) in zip(clutch_moments(record).values(), (
+            (LEFT_CLUTCH, 'clutch, left shaft: > 0 slows it'),
+            (RIGHT_CLUTCH, 'clutch, right shaft: < 0 drives it'))):
+        ax.plot(record.time, moment, color=colour, label=label)
+    if car['left_brake'].any():
+        ax.plot(record.time, car['left_brake'], color=CONTROLLER, linestyle='--',
+                label='brake, left wheel')
+    forces = list(record.clutch_force.values())
+    if any(force.any() for force in forces):
+        # both clutches have about the same
+        ax.plot(record.time, forces[0] / FORCE_SCALE, color=CONTROLLER, linestyle=':',
+                label='actuator, left clutch (scale on the right)')
+        ax.secondary_yaxis('right', functions=(
+            lambda moment: moment * FORCE_SCALE / 1e3, lambda force: force * 1e3 / FORCE_SCALE,
+            )).set_ylabel('force of the actuator, kN')
 
 
 def positive(text):
@@ -195,7 +265,7 @@ def positive(text):
 
 
 def main(args=None):
-    """Run the three cases; return the exit code."""
+    """Run the four cases; return the exit code."""
     parser = argparse.ArgumentParser(
         'brake_lock.py', description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter)

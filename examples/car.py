@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A car on a hill with one wheel on ice, and the brake-based lock of its differential.
+A car on a hill with one wheel on ice, and two controllers: by its brakes and by clutches.
 
 Nothing here knows ROS: ``Car`` turns shaft speeds into torques, ``BrakeLock`` turns wheel speeds
-into brake demands, and ``car_nodes`` wraps each into an rclpy node. All numbers are those of a
-front-driven middle-class car in first gear.
+into brake demands, ``LimitedSlip`` turns the slip of a clutch into a force on it. ``car_nodes``
+and ``limited_slip`` wrap each into an rclpy node. All numbers are those of a front-driven
+middle-class car in first gear.
 """
 
 from dataclasses import dataclass
@@ -154,3 +155,23 @@ class BrakeLock:
 
     def _limited(self, torque):
         return min(max(torque, 0.0), self.LIMIT)
+
+
+@dataclass(frozen=True)
+class LimitedSlip:
+    """
+    An electronic limited slip: presses a clutch of the differential the harder, the more it slips.
+
+    It is proportional beyond a dead band and has no memory, so it suits any rate, and a clutch
+    that does not slip is open.
+    """
+
+    threshold: float = 1.5    # rad/s, by which a wheel may differ from the carrier, as in a bend
+    gain: float = 4000.0      # N s/rad
+    limit: float = 10_000.0   # N, what the actuator can do
+
+    def force(self, slip):
+        """Return the axial force on a clutch, N, at its slip, rad/s; 0 if nobody knows that."""
+        if not math.isfinite(slip):
+            return 0.0
+        return max(0.0, min(self.limit, self.gain * (abs(slip) - self.threshold)))

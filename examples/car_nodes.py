@@ -4,14 +4,15 @@
 """
 The car and the lock of its differential as ordinary rclpy nodes: thin shells around ``car``.
 
-    differential --- joint_states ---> brake_lock --- brake_demands ---> car --- torques
-         ^  |                                                             ^         |
-         |  +------------------------- joint_states ----------------------+         |
-         +--------------------------------------------------------------------------+
+    differential --- joint_states ---> brake_lock ----- brake_demands -----> car --- torques
+         ^  |   or --- clutches ---> limited_slip  or  clutch_demands         ^         |
+         |  +------------------------- joint_states --------------------------+         |
+         +------------------------------------------------------------------------------+
 
 In lockstep each message on ``~/torques`` is a tick, so exactly one node may publish it: the car.
-It waits for the joint states and the brake demands of one stamp, in whichever order they come,
-and answers them with one message of torques. So nothing depends on timing.
+It waits for the joint states and the demands of one stamp, in whichever order they come, and
+answers them with one message of torques, and of forces on the clutches. So nothing depends on
+timing.
 """
 
 from collections import deque
@@ -53,25 +54,27 @@ class BrakeLockNode(Node):
 
 class CarNode(Node):
     """
-    Answers the speeds of the shafts, and the demands on the brakes, with torques on the shafts.
+    Answers the speeds of the shafts, and the demands of a controller, with torques on the shafts.
 
-    in   ``differential/joint_states``, ``brake_demands``   out  ``differential/torques``
+    A demand on a wheel is one on its brake, N m; any other goes on to the differential with the
+    torques, such as the force on a clutch, N.
+
+    in   ``differential/joint_states`` and the demands   out  ``differential/torques``
 
     :param car: a ``Car``; inputs: names of the driven, the left and the right shaft.
-    :param braked: whether somebody demands brakes, to be waited for.
+    :param demands: the topic of a controller that is to be waited for, None without one.
     """
 
-    def __init__(self, car, inputs, braked, **node_options):
+    def __init__(self, car, inputs, demands=None, **node_options):
         super().__init__('car', **node_options)
         self.car, self._inputs = car, inputs
         self._states, self._demands = deque(), deque()
         self._torques = self.create_publisher(JointState, 'differential/torques', EVERY_MESSAGE)
         self.create_subscription(
             JointState, 'differential/joint_states', self._on_state, EVERY_MESSAGE)
-        self._braked = braked
-        if braked:
-            self.create_subscription(
-                JointState, 'brake_demands', self._on_demand, EVERY_MESSAGE)
+        self._controlled = demands is not None
+        if self._controlled:
+            self.create_subscription(JointState, demands, self._on_demand, EVERY_MESSAGE)
 
     def restart(self):
         """Go back to the start, as after a reset of the differential."""
@@ -81,8 +84,8 @@ class CarNode(Node):
 
     def _on_state(self, joints):
         self._states.append(joints)
-        if not self._braked:
-            self._demands.append(JointState(header=joints.header, effort=[0.0, 0.0]))
+        if not self._controlled:
+            self._demands.append(JointState(header=joints.header))
         self._answer()
 
     def _on_demand(self, demands):
@@ -93,11 +96,14 @@ class CarNode(Node):
         while self._states and self._demands:
             joints, demands = self._states.popleft(), self._demands.popleft()
             if joints.header.stamp != demands.header.stamp:
-                raise RuntimeError('brake_demands do not answer the joint states')
+                raise RuntimeError('the demands do not answer the joint states')
+            demanded = dict(zip(demands.name, demands.effort))
+            brakes = [demanded.pop(wheel, 0.0) for wheel in self._inputs[1:]]
             drive, *wheels = speeds(joints, self._inputs)
-            torques = self.car.torques(drive, wheels, demands.effort)
-            self._torques.publish(
-                JointState(header=joints.header, name=self._inputs, effort=torques))
+            torques = self.car.torques(drive, wheels, brakes)
+            self._torques.publish(JointState(
+                header=joints.header, name=[*self._inputs, *demanded],
+                effort=[*torques, *demanded.values()]))
 
 
 def speeds(joints, names):

@@ -3,10 +3,13 @@
 
 """The worked example without topics, and the stability limit of doc/coupling.md."""
 
+from dataclasses import replace
+import math
 from pathlib import Path
 import re
 import sys
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'examples'))
@@ -14,11 +17,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / 'examples'))
 import brake_lock
 import coupling
 
+from dm_ros.energy import AuditedSimulation
 from dm_ros.mechanism.variants import variant_named
 from dm_ros.testing import DirectDifferential
 
 ROOT = Path(__file__).parents[1]
-OPEN, BRAKE, LSD = brake_lock.CASES
+OPEN, BRAKE, LSD, ELS = brake_lock.CASES
 PAGE = (ROOT / 'doc' / 'coupling.md').read_text()
 
 
@@ -41,23 +45,86 @@ def test_the_lock_brings_torque_to_the_wheel_on_asphalt():
     assert moment['left_mesh'][-1] == pytest.approx(moment['right_mesh'][-1], rel=0.01)
 
 
+def of_axle(case, seconds, **changes):
+    """Return the ``Run`` of a case in a car with other parameters."""
+    p = brake_lock.CarParameters(**changes)
+    differential = DirectDifferential(case.variant, brake_lock.RATE,
+                                      parameters=brake_lock.parameters_of(case, p))
+    law, car = brake_lock.law_of(differential, case, p=p)
+    return brake_lock.as_run(case, differential.run(law, seconds), car)
+
+
+def test_the_limited_slip_beats_the_brake_lock_and_spends_no_brake():
+    free, braked, run = (brake_lock.run(case, 3.0, direct=True) for case in (OPEN, BRAKE, ELS))
+    assert run.car['speed'][-1] > 1.5 * braked.car['speed'][-1] > 15 * free.car['speed'][-1]
+    assert run.record.slip.max() < 6.5 and run.record.slip.min() > -0.1   # rad/s
+    assert not run.car['left_brake'].any() and not run.car['right_brake'].any()
+    assert run.heat['brakes'] == 0.0
+    assert 1e3 < run.heat['clutches'] < braked.heat['brakes']   # J
+    left, right = run.record.clutch_force.values()
+    assert 0.0 < left.max() < brake_lock.LimitedSlip().limit
+    assert left == pytest.approx(right, rel=1e-6)   # one slip for both clutches
+    # it settles, and does not hunt
+    assert abs(run.record.slip[run.record.time > 1.5] - run.record.slip[-1]).max() < 0.3
+    assert np.ptp(left[-500:]) < 100.0   # N
+
+
+def test_the_axle_of_the_limited_slip_is_open_without_its_controller():
+    run = brake_lock.run(replace(ELS, controller=None), 3.0, direct=True)
+    free = brake_lock.run(OPEN, 3.0, direct=True)
+    assert run.car['speed'][-1] == pytest.approx(free.car['speed'][-1], abs=0.03)
+    assert run.record.slip[-1] == pytest.approx(free.record.slip[-1], rel=0.01)
+    assert run.heat['clutches'] == 0.0
+
+
+def test_the_limited_slip_helps_either_wheel_alike_and_does_nothing_on_an_even_road():
+    ice, asphalt = brake_lock.CarParameters().grip
+    left, right, even = (of_axle(ELS, 1.5, grip=grip).car['speed'][-1] for grip in (
+        (ice, asphalt), (asphalt, ice), (asphalt, asphalt)))
+    assert left == pytest.approx(right, rel=1e-3)
+    assert even > left
+    run = of_axle(ELS, 1.5, grip=(asphalt, asphalt))
+    assert not any(force.any() for force in run.record.clutch_force.values())
+
+
+def test_the_heat_of_the_clutches_is_that_of_the_books():
+    books = DirectDifferential(ELS.variant, brake_lock.RATE)
+    books.simulation = AuditedSimulation(ELS.variant, 1.0 / brake_lock.RATE,
+                                         parameters=brake_lock.parameters_of(ELS))
+    law, car = brake_lock.law_of(books, ELS)
+    run = brake_lock.as_run(ELS, books.run(law, 1.5), car)
+    assert run.heat['clutches'] == pytest.approx(
+        sum(books.simulation.total.clutches), rel=2e-3)
+
+
+def test_a_force_on_a_clutch_grows_beyond_the_dead_band_up_to_its_limit_and_opens_again():
+    law = brake_lock.LimitedSlip(threshold=1.5, gain=4000.0, limit=10_000.0)
+    for sign in (1.0, -1.0):
+        forces = [law.force(sign * slip) for slip in (0.0, 1.5, 2.0, 3.5, 4.0, 1e3, 1.0)]
+        assert forces == [0.0, 0.0, 2000.0, 8000.0, 10_000.0, 10_000.0, 0.0]
+
+
+@pytest.mark.parametrize('slip', [math.nan, math.inf, -math.inf])
+def test_a_clutch_whose_slip_nobody_knows_is_open(slip):
+    assert brake_lock.LimitedSlip().force(slip) == 0.0
+
+
 def test_the_page_of_the_example_says_what_the_command_says():
     lines = brake_lock.report(
         [brake_lock.run(case, 5.0, direct=True) for case in brake_lock.CASES])
     page = (ROOT / 'doc' / 'example.md').read_text()
-    for line in lines[2:5]:
-        _, car, slip, _, tyre = line.split()
-        assert f'| {car} | {slip} | {tyre} |' in page
+    for case, line in zip(brake_lock.CASES, lines[2:6]):
+        name, car, slip, _, tyre, _, brakes, clutches = line.split()
+        assert name == case.name
+        assert f'| {case.title} | {car} | {slip} | {tyre} | {brakes} | {clutches} |' in page
+    # what the text says of the force and of the share of the brake lock
+    force, share = lines[5].split()[5], float(lines[5].split()[1]) / float(lines[3].split()[1])
+    assert f'up to {force} kN' in page and f'{share:.1f} times' in page
 
 
 def test_the_asymmetric_axle_locks_better_towards_its_stronger_side():
     def final_speed(grip):
-        p = brake_lock.CarParameters(grip=grip)
-        differential = DirectDifferential('lsd_ode', 1000.0,
-                                          parameters=brake_lock.parameters_of(LSD, p))
-        law, car = brake_lock.law_of(differential, LSD, p=p)
-        differential.run(law, seconds=2.0)
-        return car.speed
+        return of_axle(LSD, 2.0, grip=grip).car['speed'][-1]
     ice, asphalt = brake_lock.CarParameters().grip
     assert final_speed((ice, asphalt)) > 1.2 * final_speed((asphalt, ice))
 

@@ -6,11 +6,13 @@
 from functools import cache
 import math
 from pathlib import Path
+import signal
 import sys
 
 import numpy as np
 from processes import Forked
 import pytest
+from sensor_msgs.msg import JointState
 
 sys.path.insert(0, str(Path(__file__).parents[2] / 'examples'))
 
@@ -19,10 +21,11 @@ import brake_lock
 from dm_ros.testing import DirectDifferential, lockstep, LockstepDifferential
 
 ROOT = Path(__file__).parents[2]
-OPEN, BRAKE, LSD = brake_lock.CASES
-SECONDS = {OPEN: 1.25, BRAKE: 1.25, LSD: 1.0}
+OPEN, BRAKE, LSD, ELS = brake_lock.CASES
+SECONDS = {OPEN: 1.25, BRAKE: 1.25, LSD: 1.0, ELS: 1.25}
 COMMAND = f'import sys; sys.path.insert(0, {str(ROOT / "examples")!r})\n' + \
     'import brake_lock; sys.exit(brake_lock.main())'
+LIMITED_SLIP = COMMAND.replace('brake_lock', 'limited_slip')
 
 
 @cache
@@ -61,6 +64,19 @@ def test_the_self_locking_axle_pulls_better_than_the_open_one():
     assert lsd.record.moment['rear_mesh'][last] > 1.3 * free.record.moment['right_mesh'][last]
 
 
+def test_the_limited_slip_holds_the_wheel_on_ice_without_a_brake():
+    free, braked, run = through_topics(OPEN), through_topics(BRAKE), through_topics(ELS)
+    slip, after = run.record.slip, run.record.time - grip_lost(run)
+    assert slip.max() < 6.5                     # rad/s
+    assert abs(slip[after > 0.8]).max() < 6.1
+    assert run.car['speed'][-1] > 1.2 * braked.car['speed'][-1] > 5 * free.car['speed'][-1]
+    assert run.heat['brakes'] == 0.0 < run.heat['clutches']
+    # open before there is slip: the first message comes from a car at rest
+    forces = np.array(list(run.record.clutch_force.values()))
+    assert not forces[:, abs(slip) < 2.0].any()
+    assert forces[:, after > 0.8].min() > 4000.0   # N
+
+
 @pytest.mark.parametrize('case', brake_lock.CASES, ids=[case.name for case in brake_lock.CASES])
 def test_through_topics_and_direct_are_the_same_to_the_last_bit(case):
     topics, direct = through_topics(case), brake_lock.run(case, SECONDS[case], direct=True)
@@ -70,18 +86,20 @@ def test_through_topics_and_direct_are_the_same_to_the_last_bit(case):
         assert (topics.car[name] == values).all(), name
 
 
-def test_a_reset_of_all_repeats_the_run(monkeypatch):
+@pytest.mark.parametrize('case', [BRAKE, ELS], ids=['brake', 'els'])
+def test_a_reset_of_all_repeats_the_run(monkeypatch, case):
     monkeypatch.setattr(lockstep, 'LAST_ANSWER', 60.0)   # a slow machine may need it
     with LockstepDifferential(
-            BRAKE.variant, brake_lock.RATE, brake_lock.parameters_of(BRAKE)) as vehicle:
-        car = brake_lock.attach(vehicle, BRAKE)
-        first = vehicle.run(0.4)
+            case.variant, brake_lock.RATE, brake_lock.parameters_of(case)) as vehicle:
+        car = brake_lock.attach(vehicle, case)
+        first = vehicle.run(0.5)
         vehicle.reset()
         for node in vehicle.executor.get_nodes():
             if hasattr(node, 'restart'):
                 node.restart()
-        again = vehicle.run(0.4)
-    assert car.brakes[0] > 0.0
+        again = vehicle.run(0.5)
+    force = max((values[-1] for values in first.clutch_force.values()), default=0.0)
+    assert (car.brakes[0] > 0.0, force > 0.0) == (case is BRAKE, case is ELS)
     for name, values in first.columns.items():
         assert (again.columns[name] == values).all(), name
 
@@ -90,10 +108,29 @@ def test_the_command_draws_the_picture(tmp_path):
     with Forked(COMMAND, '--seconds', 0.1, '--out', tmp_path / 'out') as command:
         assert command.ended() == 0, command.errors
         lines = command.output.splitlines()
-    assert [line.split()[0] for line in lines[2:5]] == ['open', 'brake', 'lsd']
+    assert [line.split()[0] for line in lines[2:6]] == ['open', 'brake', 'lsd', 'els']
     assert (tmp_path / 'out' / 'example.png').read_bytes().startswith(b'\x89PNG')
     direct = DirectDifferential(LSD.variant, brake_lock.RATE,
                                 parameters=brake_lock.parameters_of(LSD))
     direct.run(brake_lock.law_of(direct, LSD)[0], 0.1)
     direct.record.save_csv(tmp_path / 'direct.csv')
     assert (tmp_path / 'out' / 'lsd.csv').read_bytes() == (tmp_path / 'direct.csv').read_bytes()
+
+
+def test_the_limited_slip_runs_beside_a_node_in_real_time_and_its_end_opens_the_clutches(ros):
+    node = ros.differential(ELS.variant, rate=200.0, torque_timeout=0.5, **{
+        name.replace('.', '__'): value for name, value in brake_lock.parameters_of(ELS).items()})
+    clutches = ros.listen(JointState, '/differential/clutches')
+    torques = ros.publisher(JointState, '/differential/torques')
+
+    def force_with_torque():
+        """Return the forces while the left wheel has no grip."""
+        torques.publish(JointState(name=node.simulation.inputs, effort=[300.0, 0.0, -150.0]))
+        return clutches[-1].effort if clutches else [0.0, 0.0]
+
+    with Forked(LIMITED_SLIP, '--ros-args', '-p', 'limit:=500.0') as controller:
+        ros.until(lambda: min(force_with_torque()) > 499.0)
+        assert max(clutches[-1].effort) <= 500.0
+        assert controller.ended(signal.SIGINT) == 0
+        assert 'Traceback' not in controller.errors
+    ros.until(lambda: max(force_with_torque()) < 1e-3)
