@@ -84,7 +84,7 @@ def passive_trajectory(p, load, dt, lagged=False):
     rows, index = [], []
     for T in load:
         direction = who_drives(T[0] * (k.g_F or 1.0) * w, abs(w) > k.sign_speed, 0.0, direction)
-        u = passive.held(T, friction)
+        u = passive.held(k, T, friction)
 
         def f(t, y, u=u):
             return passive.evaluate(k, u, float(y[0]), float(y[1]))[:2]

@@ -9,13 +9,14 @@ program drives it by the same methods. It knows no ROS, no clock and no thread: 
 ``prepared`` belong between two ticks.
 """
 
+import math
 from typing import NamedTuple
 
 from dm_ros.motion.energy import AuditedSimulation, given_back
 from dm_ros.motion.held_inputs import HeldInputs
 from dm_ros.motion.models import PAPER
 from dm_ros.motion.simulation import NO_FORCE, Simulation
-from dm_ros.settings import make_simulation, NodeParameters
+from dm_ros.settings import make_simulation, NodeParameters, port_parameters, speed_ports
 
 
 class Condition:
@@ -53,6 +54,7 @@ class Prepared(NamedTuple):
     """A change of parameters that may be adopted: what holds then."""
 
     settings: NodeParameters
+    ports: dict           # {shaft: PortParameters}
     model: tuple | None   # of ``Simulation.prepare``; None where the mechanism stays as it is
 
 
@@ -71,12 +73,14 @@ class Plant:
             settings.variant, values,
             kind=AuditedSimulation if settings.energy_audit else Simulation)
         mechanism = self.simulation.mechanism
+        self.ports = port_parameters(mechanism.inputs, values)
         self.inputs = HeldInputs(mechanism.ports + mechanism.actuators, (), 0.0)
         self._shafts = len(mechanism.ports)
         self.ticks = 0   # in all, also refused ones and those before a reset
         self.refusing = Condition('messages are refused', log)
         self.clamping = Condition('demands are clamped', log)
         self.stale = Condition('demands are too old and count as zero', log)
+        self.freed = Condition('speeds are too old and their shafts are free', log)
         self.out_of_range = Condition('ticks are refused', log)
         self.coarse = Condition('solver steps are coarse', log)
         self.motoring = Condition('gears and bearings give energy back, as motors', log)
@@ -91,15 +95,20 @@ class Plant:
     @property
     def values(self):
         """``{full name: value}`` of all parameters, its own and those of its mechanism."""
-        return {**self.settings.named(), **self.simulation.parameters.named()}
+        return {name: value for table in self._tables for name, value in table.named().items()}
+
+    @property
+    def _tables(self):
+        return self.settings, self.simulation.parameters, *self.ports.values()
 
     def take(self, names, values, what, stamp=0, sparse=False):
         """
         Take a demand for some ports, whole or not at all; return whether it was taken.
 
-        The ports are the shafts that take a torque, N m, and the clutches that take an axial
-        force, N, by the names of their moments.
+        The ports are the shafts that take a torque, N m, or a speed, rad/s, and the clutches that
+        take an axial force, N, by the names of their moments.
 
+        :param values: for each name, or ``Joints``, see ``HeldInputs.demand``.
         :param what: what brought it, in words.
         :param stamp: ns, in which demands must follow one another; 0 for none.
         :param sparse: whether NaN stands for no demand, else it is refused.
@@ -150,8 +159,7 @@ class Plant:
         :param changes: ``{full name: value}``.
         :raises ValueError: names the parameter, its value and what is allowed.
         """
-        rows = {name: row for name, row in (*self.settings.rows().values(),
-                                            *self.simulation.parameters.rows().values())}
+        rows = {name: row for table in self._tables for name, row in table.rows().values()}
         for name in changes:
             if name not in rows:
                 raise ValueError(f'{name}: there is no such parameter')
@@ -159,20 +167,25 @@ class Plant:
                 raise ValueError(f'{name}: it cannot be changed while it runs')
         settings = self.settings.changed(self.settings.part_of(changes))
         mechanism = self.simulation.parameters.part_of(changes)
+        ports = {shaft: table.changed(table.part_of(changes))
+                 for shaft, table in self.ports.items()}
         model = None
-        if mechanism or settings.substeps != self.settings.substeps:
-            model = self.simulation.prepare(mechanism, settings.substeps)
-        return Prepared(settings, model)
+        if mechanism or settings.substeps != self.settings.substeps or ports != self.ports:
+            model = self.simulation.prepare(mechanism, settings.substeps, speed_ports(ports))
+        return Prepared(settings, ports, model)
 
     def adopt(self, prepared):
         """Put into force what ``prepared`` returned; speeds and angles go on."""
-        self.settings = settings = prepared.settings
+        self.settings, self.ports = prepared.settings, prepared.ports
+        settings = self.settings
         simulation = self.simulation
         if prepared.model:
             simulation.adopt(prepared.model)
         simulation.power_flow_deadband = settings.deadband
         simulation.initial_velocity = settings.initial_velocity(simulation.outputs)
-        self.inputs.limits = (settings.torque_limit,) * self._shafts + simulation.force_limits
+        limit = {'torque': settings.torque_limit, 'speed': math.inf}
+        self.inputs.limits = (*(limit[port.kind] for port in simulation.mechanism.ports),
+                              *simulation.force_limits)
         # in lockstep time stands still without torques, so none is too old
         self.inputs.timeout = 0.0 if self.lockstep else settings.torque_timeout * settings.rate
 
@@ -182,9 +195,12 @@ class Plant:
         if coarse > self._coarse_before:
             self.coarse.happened('their work reached its bound', coarse - self._coarse_before)
         self._coarse_before = coarse
+        free = set(self.simulation.mechanism.half_shafts)
         stale = self.inputs.stale(self.simulation.ticks)
-        if stale:
-            self.stale.happened(', '.join(stale))
+        for condition, names in ((self.stale, [name for name in stale if name not in free]),
+                                 (self.freed, [name for name in stale if name in free])):
+            if names:
+                condition.happened(', '.join(names))
         before, self._books_before = self._books_before, self._books()
         if self._books_before and (energy := given_back(before, self._books_before)):
             self.motoring.happened(
@@ -193,8 +209,8 @@ class Plant:
 
     def settle(self):
         """Let the conditions end that are over; to be called at 1 Hz, after ``notice``."""
-        for condition in (self.refusing, self.clamping, self.stale, self.out_of_range,
-                          self.coarse, self.motoring):
+        for condition in (self.refusing, self.clamping, self.stale, self.freed,
+                          self.out_of_range, self.coarse, self.motoring):
             condition.settle()
 
     def _books(self):

@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 
 from dm_ros.mechanism.parameters import Parameters, row
-from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS
+from dm_ros.mechanism.variants import MECHANISMS, PORT_TABLES, variant_named, VARIANTS
 from dm_ros.motion.models import LOSS_LAWS, PASSIVE
 from dm_ros.motion.simulation import Simulation
 
@@ -63,14 +63,27 @@ class NodeParameters(Parameters):
 
 
 def tables():
-    """Return the tables of all parameters there are: those of each mechanism and of the node."""
-    return *(mechanism.parameters for mechanism in MECHANISMS.values()), NodeParameters
+    """Return the tables of all parameters there are: of mechanisms, of ports, of the node."""
+    return (*(mechanism.parameters for mechanism in MECHANISMS.values()), *PORT_TABLES.values(),
+            NodeParameters)
 
 
 def known_rows():
     """Return ``{full name: Row}`` of every parameter there is."""
     return {name: entry
             for table in tables() for name, entry in table.rows().values()}
+
+
+def port_parameters(inputs, values):
+    """Return ``{shaft: PortParameters}`` of some input shafts, from values by full name."""
+    return {shaft: PORT_TABLES[shaft]().changed(PORT_TABLES[shaft].part_of(values))
+            for shaft in inputs}
+
+
+def speed_ports(tables):
+    """Return ``ports`` as a ``Simulation`` takes them, of what ``port_parameters`` returned."""
+    return {shaft: (table.stiffness, table.damping) for shaft, table in tables.items()
+            if table.kind == 'speed'}
 
 
 def make_simulation(variant, values, dt=None, kind=Simulation):
@@ -86,4 +99,5 @@ def make_simulation(variant, values, dt=None, kind=Simulation):
     return kind(
         variant, 1 / node.rate if dt is None else dt, mechanism.parameters.part_of(values),
         loss_law=node.loss_law, substeps=node.substeps, power_flow_deadband=node.deadband,
-        initial_velocity=node.initial_velocity(mechanism.outputs))
+        initial_velocity=node.initial_velocity(mechanism.outputs),
+        ports=speed_ports(port_parameters(mechanism.inputs, values)))

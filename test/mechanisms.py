@@ -64,7 +64,7 @@ class PassiveFlow(Flow):
         """Take friction that does not follow M, or None for that of the preload beside it."""
         self.k = passive.coefficients(p, p.has_clutches, friction is None)
         preload = clutched.full_friction(p)[1] if p.has_clutches else (0.0, 0.0)
-        self.u = passive.held(tuple(T), friction or preload)
+        self.u = passive.held(self.k, tuple(T), friction or preload)
 
     def lost(self, w, s):
         """Return the power that each element takes, W."""

@@ -225,6 +225,19 @@ def jacobian(k, u, point):
             (F_1w, F_1s, F_2w, F_2s))
 
 
+def torque_slopes(k, u, point):
+    """Return what dw/dt, and what ds/dt, grows with per torque on each port, two triples."""
+    _, _, _, _, _, _, _, _, x_1, x_2 = point
+    a, b, c, d = 1 + x_1 * k.W_11, x_1 * k.W_12, x_2 * k.W_21, 1 + x_2 * k.W_22
+    det = a * d - b * c
+    slopes = []
+    for B_w, B_s, Q_1, Q_2 in ((k.B_w0, k.B_s0, k.Q_10, k.Q_20), (k.B_w1, k.B_s1, k.Q_11, k.Q_21),
+                               (k.B_w2, k.B_s2, k.Q_12, k.Q_22)):
+        F_1, F_2 = (d * x_1 * Q_1 - b * x_2 * Q_2) / det, (a * x_2 * Q_2 - c * x_1 * Q_1) / det
+        slopes.append((B_w - k.C_w1 * F_1 - k.C_w2 * F_2, B_s - k.C_s1 * F_1 - k.C_s2 * F_2))
+    return tuple(zip(*slopes))
+
+
 def final_drive_moment(k, y, T, point):
     """Return M_F at a ``point`` of the state y, by ``FinalDrive``."""
     (w, s), (T_0, T_1, T_2) = y, T

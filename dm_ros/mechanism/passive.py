@@ -122,7 +122,7 @@ def has_solutions(k):
     return True
 
 
-def held(T, S):
+def held(k, T, S):
     """
     Return what is constant in a step: ``(T_in, T_1, T_2, S_1, S_2)``, N m.
 
@@ -272,6 +272,24 @@ def jacobian(k, u, point):
     r_s = k.g_12 * (n_1s * M_1 + n_1 * M_1s) - n_2s * M_2 - n_2 * M_2s + k.l_s
     return ((G_12 * r_w - G_22 * g_w) / det, (G_12 * r_s - G_22 * g_s) / det,
             (G_21 * g_w - G_11 * r_w) / det, (G_21 * g_s - G_11 * r_s) / det), None
+
+
+def torque_slopes(k, u, point):
+    """Return what dw/dt, and what ds/dt, grows with per torque on each port, at fixed signs."""
+    T_in = u[0]
+    _, _, _, _, _, _, _, (_, _, s_F, _, b), (w, _, sigma_0, *_), solved = point
+    n_1, n_2, p_1, p_2, _, _, y_1, y_2, _, _, a_X, _, G_11, G_12, G_21, G_22, det = solved
+    drive = a_X if T_in * w < 0.0 else 1.0
+    if k.g_F:
+        h, beta_3 = k.half_F * sigma_0 * s_F, k.bearing_3 * abs(sigma_0)
+        a_P, a_C = (1 + beta_3, 1.0) if w * s_F > 0.0 else (1.0, a_X)
+        drive = a_C * (k.mean_F - h) * k.g_F / (a_P * (k.mean_F + h))
+        if T_in * k.g_F * w < 0.0:
+            drive *= 1 + beta_3
+    # G (e_0, ds/dt) = R, and R grows with the torques as follows
+    R = ((drive, 0.0), (y_1 / p_1, k.g_12 * n_1 / p_1), (y_2 / p_2, -n_2 / p_2))
+    return (tuple([(R_1 * G_22 - R_2 * G_12) / det for R_1, R_2 in R]),
+            tuple([(G_11 * R_2 - G_21 * R_1) / det for R_1, R_2 in R]))
 
 
 def bends(k, here, there):

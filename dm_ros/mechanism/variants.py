@@ -7,6 +7,7 @@ from typing import Callable, NamedTuple
 
 from dm_ros.mechanism import loads, self_locking, symmetric
 from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.ports import port_table, speed
 
 
 class Mechanism(NamedTuple):
@@ -35,6 +36,11 @@ class Mechanism(NamedTuple):
     def clutch_moments(self):
         """Names of the clutches as internal moments, which are those of their actuators too."""
         return tuple(port.name for port in self.actuators)
+
+    @property
+    def half_shafts(self):
+        """Names of the shafts whose port takes a speed, by an elastic shaft."""
+        return tuple(port.name for port in self.ports if port.kind == 'speed')
 
     @property
     def moments(self):
@@ -79,9 +85,24 @@ CATALOGUE = {variant.name: variant for variant in (
 VARIANTS = tuple(CATALOGUE)
 
 
-def equipped(mechanism, parameters):
-    """Return a ``Mechanism`` with the clutches that its parameters give it, if any."""
-    return WITH_CLUTCHES[mechanism.name] if parameters.has_clutches else mechanism
+# the tables of the parameters of ports, of all mechanisms
+PORT_TABLES = {shaft: port_table(shaft)
+               for mechanism in MECHANISMS.values() for shaft in mechanism.inputs}
+
+
+def equipped(mechanism, parameters, speeds=()):
+    """
+    Return a ``Mechanism`` with what it has beside its gears.
+
+    :param parameters: its table, which may give it clutches.
+    :param speeds: names of the shafts whose port takes a speed instead of a torque.
+    """
+    if parameters.has_clutches:
+        mechanism = WITH_CLUTCHES[mechanism.name]
+    if speeds:
+        mechanism = mechanism._replace(ports=tuple(
+            speed(port.name) if port.name in speeds else port for port in mechanism.ports))
+    return mechanism
 
 
 def variant_named(name):

@@ -39,8 +39,10 @@ MOST_RESORTS = 1000     # steps of the last resort, which is halved where it fin
 class Law(NamedTuple):
     """The equations of motion under a law of losses, as functions of plain floats."""
 
+    held: Callable          # (k, T, S) -> u, what is constant in a step
     evaluate: Callable      # (k, u, w, s) -> point, which begins with dw/dt, ds/dt
     jacobian: Callable      # (k, u, point) -> (J_ww, J_ws, J_sw, J_ss) and what else it knows
+    torque_slopes: Callable   # (k, u, point) -> what dw/dt and ds/dt grow with per torque
     last_resort: Callable   # (law, k, u, y, J, h) -> y and its integral after a step, or None
     most_trials: int
     relative: float         # error estimate allowed besides, of the change of speed in a part
@@ -177,8 +179,10 @@ def implicit_euler(law, k, u, y, J, h):
     return ((w, s), (h * w, h * s)) if solved(law, k, u, y, (w, s), h) else None
 
 
-PAPER = Law(clutched.evaluate, clutched.jacobian, backward_euler, 200, 1e-6, lambda *_: True)
-PASSIVE = Law(passive.evaluate, passive.jacobian, implicit_euler, 400, 1e-12, passive.bends)
+PAPER = Law(clutched.held, clutched.evaluate, clutched.jacobian, clutched.torque_slopes,
+            backward_euler, 200, 1e-6, lambda *_: True)
+PASSIVE = Law(passive.held, passive.evaluate, passive.jacobian, passive.torque_slopes,
+              implicit_euler, 400, 1e-12, passive.bends)
 
 
 def step(law, k, u, y, h, tolerance=TOLERANCE, here=None):

@@ -23,7 +23,7 @@ Every term is computed on its own, none is the remainder of the others:
 from operator import add
 from typing import NamedTuple
 
-from dm_ros.motion.meters import meter_of
+from dm_ros.motion.coupled_meter import meter_of
 from dm_ros.motion.simulation import NO_FORCE, Simulation
 from dm_ros.motion.state import Snapshot
 
@@ -40,6 +40,7 @@ class Layout(NamedTuple):
     gears: slice
     bearings: slice
     clutches: slice
+    half_shafts: slice
     numerical: int
     scale: int
 
@@ -50,10 +51,11 @@ class Layout(NamedTuple):
         gears = stored + 2
         bearings = gears + len(mechanism.gears)
         clutches = bearings + len(mechanism.bearings)
-        numerical = clutches + len(mechanism.clutches)
+        half_shafts = clutches + len(mechanism.clutches)
+        numerical = half_shafts + len(mechanism.half_shafts)
         return cls(slice(0, stored), stored, stored + 1, slice(gears, bearings),
-                   slice(bearings, clutches), slice(clutches, numerical), numerical,
-                   numerical + 1)
+                   slice(bearings, clutches), slice(clutches, half_shafts),
+                   slice(half_shafts, numerical), numerical, numerical + 1)
 
     @property
     def losses(self):
@@ -79,7 +81,7 @@ class Energy(NamedTuple):
 
     @property
     def stored(self):
-        """The change of the kinetic energy."""
+        """The change of the kinetic energy, and of that in the twist of half-shafts."""
         return self.entries[self.layout.stored]
 
     @property
@@ -101,6 +103,11 @@ class Energy(NamedTuple):
     def clutches(self):
         """The loss in each clutch, in the order of ``clutch_names``."""
         return self.entries[self.layout.clutches]
+
+    @property
+    def half_shafts(self):
+        """The loss in the damping of each half-shaft, in the order of ``half_shaft_names``."""
+        return self.entries[self.layout.half_shafts]
 
     @property
     def numerical(self):
@@ -200,8 +207,13 @@ class AuditedSimulation(Simulation):
         """Names of the clutches, in the order of ``Energy.clutches``."""
         return self.mechanism.clutch_moments
 
-    def prepare(self, parameters, substeps=None):
-        model, substeps = super().prepare(parameters, substeps)
+    @property
+    def half_shaft_names(self):
+        """Names of the shafts with a half-shaft, in the order of ``Energy.half_shafts``."""
+        return self.mechanism.half_shafts
+
+    def prepare(self, parameters, substeps=None, ports=None):
+        model, substeps = super().prepare(parameters, substeps, ports)
         return model, substeps, meter_of(model)
 
     def adopt(self, prepared):
@@ -231,7 +243,9 @@ class AuditedSimulation(Simulation):
 
     def advance(self, torques, clutch_forces=NO_FORCE):
         steps = super().advance(torques, clutch_forces)
-        meter, T, layout = self._meter, self._torque, self._layout
+        meter, T, layout = self._meter, self._held, self._layout
+        if layout.half_shafts.start < layout.half_shafts.stop:   # a twist may be forgotten
+            self.stored_by_changes += meter.stored_energy(steps[0][0]) - self._stored
         tick = meter.book(steps[0], T)
         if len(steps) > 1:
             for step in steps[1:]:
@@ -261,7 +275,7 @@ class AuditedSimulation(Simulation):
 
     @property
     def stored_energy(self):
-        """The kinetic energy now, J."""
+        """The kinetic energy now, and that in the twist of half-shafts, J."""
         return self._stored
 
     @property

@@ -3,12 +3,22 @@
 
 """The inputs in force: what was demanded, what of it is refused, clamped or too old."""
 
+from typing import NamedTuple, Sequence
+
+
+class Joints(NamedTuple):
+    """The arrays of a JointState; what there is no speed port for is not looked at."""
+
+    efforts: Sequence
+    velocities: Sequence
+
 
 class HeldInputs:
     """
     The last demand for each port and when it came, counted in ticks.
 
-    A demand is taken whole or not at all. Ages are counted in simulated time, so a paused
+    A demand is taken whole or not at all. A port without one in force has what it has when idle:
+    no torque, no force, and no speed, which is None. Ages are counted in simulated time, so a paused
     mechanism does not lose its inputs.
     """
 
@@ -26,17 +36,20 @@ class HeldInputs:
         self.timeout = timeout
         self.received = self.refused = self.clamped = 0
         self._index = {name: i for i, name in enumerate(self.names)}
+        self._speeds = {port.name for port in ports if port.kind == 'speed'}
         self.forget()
 
     def forget(self):
         """Drop all demands: every port waits for its first one."""
-        self._demand = [0.0] * len(self.ports)
+        self._demand = [port.idle for port in self.ports]
         self._arrival = [None] * len(self.ports)
 
     def demand(self, names, values, tick, sparse=False):
         """
         Take a demand for some ports at a tick; return ``(port, limit)`` where it was clamped.
 
+        :param values: for each name, or ``Joints``: where there are speed ports each of its
+            arrays holds NaN, or is empty, where the other counts.
         :param sparse: whether NaN stands for no demand: the port keeps the older one, and its age.
         :raises ValueError: says why the demand is refused; the older one stays.
         """
@@ -54,8 +67,8 @@ class HeldInputs:
         if not self.timeout:
             return tuple(self._demand)
         oldest = tick - self.timeout
-        return tuple([0.0 if arrival is None or arrival < oldest else value
-                      for value, arrival in zip(self._demand, self._arrival)])
+        return tuple([port.idle if arrival is None or arrival < oldest else value
+                      for port, value, arrival in zip(self.ports, self._demand, self._arrival)])
 
     def stale(self, tick):
         """Return the names of the ports whose demand is too old."""
@@ -66,7 +79,24 @@ class HeldInputs:
         """Return the names of the ports that never had a demand."""
         return [name for name, arrival in zip(self.names, self._arrival) if arrival is None]
 
+    def _of_kinds(self, names, efforts, velocities):
+        """Return one value for each name, the one that its port takes."""
+        kinds = [name in self._speeds for name in names]
+        for what, values, needed in (('efforts', efforts, False), ('velocities', velocities, True)):
+            if len(values) != len(names) and (len(values) or needed in kinds):
+                raise ValueError(f'{len(names)} names but {len(values)} {what}')
+        values = []
+        for i, (name, is_speed) in enumerate(zip(names, kinds)):
+            takes, other = (velocities, efforts) if is_speed else (efforts, velocities)
+            if len(other) and other[i] == other[i]:   # not NaN
+                raise ValueError(f'{name} takes {"a speed" if is_speed else "no speed"}, its '
+                                 f'{"effort" if is_speed else "velocity"} must be NaN')
+            values.append(takes[i])
+        return values
+
     def _take(self, names, values, tick, sparse):
+        if isinstance(values, Joints):
+            values = (self._of_kinds(names, *values) if self._speeds else values.efforts)
         if len(names) != len(values):
             raise ValueError(f'{len(names)} names but {len(values)} values')
         if len(set(names)) != len(names):

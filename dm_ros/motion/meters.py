@@ -13,7 +13,7 @@ linear in speeds and torques but for the friction of clutches. So what a meter m
 is its integral, its second moment, the integral of x x', and what friction does on it.
 """
 
-from operator import add
+from operator import add, mul
 
 import numpy as np
 
@@ -149,7 +149,7 @@ class ClutchedMeter:
 
     def __init__(self, model):
         p = model.parameters
-        self._m = self_locking_form(p)
+        self.form = self_locking_form(p)
         self._k_1, self._k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
         self._input_ratio = 1.0   # of the input shaft to the carrier
         self._coefficients = model.coefficients
@@ -157,20 +157,30 @@ class ClutchedMeter:
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
-        return kinetic_energy(self._m, x)
+        return kinetic_energy(self.form, x)
+
+    def angles(self, integral):
+        """Return the angles of the shafts with a port from the integral of x, rad."""
+        a_w, a_s = integral
+        return self._input_ratio * a_w, a_w + self._k_1 * a_s, a_w - self._k_2 * a_s
+
+    def lost_powers(self, direction, T, y, u, point):
+        """Return the power that each element loses at a ``point``, W."""
+        (w, s), (_, _, F_1, F_2, M_1, M_2, *_) = y, point
+        return self._lost(direction, T, w, w * w, w * s, s * s, F_1 * w, F_1 * s, F_2 * w, F_2 * s,
+                          M_1 * w, M_1 * s, M_2 * w, M_2 * s)
 
     def book(self, step, T):
         """Return the energies of a step, see the module."""
-        x, direction, end, (a_w, a_s), _, _, (u, parts) = step
-        T_0, T_1, T_2 = T
+        x, direction, end, integral, _, _, (u, parts) = step
         first, *others = parts
         lost, numerical = self._part(direction, u, T, first)
         for part in others:
             more, taken = self._part(direction, u, T, part)
             lost = tuple(map(add, lost, more))
             numerical += taken
-        return (T_0 * self._input_ratio * a_w, T_1 * (a_w + self._k_1 * a_s),
-                T_2 * (a_w - self._k_2 * a_s), energy_gained(self._m, x, end), *lost, numerical)
+        work = map(mul, T, self.angles(integral))
+        return *work, energy_gained(self.form, x, end), *lost, numerical
 
     def _part(self, direction, u, T, part):
         """Return what the elements lost in a part of the path, and what its error took."""
@@ -178,7 +188,7 @@ class ClutchedMeter:
         (w, s), f, J, F, h, (d_w, d_s), (c_w, c_s), (a_w, a_s), straight, here, there = part
         (J_ww, J_ws, J_sw, J_ss), (F_1w, F_1s, F_2w, F_2s) = J, F
         v_w, v_s, F_1, F_2, _, _, _, _, _, _ = here
-        m_ww, m_ws, m_ss = self._m
+        m_ww, m_ws, m_ss = self.form
         J_path = (0.0, 0.0, 0.0, 0.0) if straight else (J_ww, J_ws, J_sw, J_ss)
         # the way vanishes at the start
         inner, _, end = rule_for(J_path, h, leads_far(w, s, d_w, d_s))
@@ -268,7 +278,7 @@ class ClutchedSymmetricMeter(ClutchedMeter):
     def __init__(self, model):
         super().__init__(model)
         p = model.parameters
-        self._m, self._input_ratio = symmetric_form(p), p.g_F
+        self.form, self._input_ratio = symmetric_form(p), p.g_F
         self._final_drives = model.final_drives
         self._losses = {d: losses.symmetric_losses(p, d) for d in model.responses}
 
@@ -293,18 +303,18 @@ class PassiveMeter:
     def __init__(self, model):
         p, self._h = model.parameters, model.h
         self._k, self._clutches = model.k, model.clutches
-        self._m = symmetric_form(p) if model.k.g_F else self_locking_form(p)
+        self.form = symmetric_form(p) if model.k.g_F else self_locking_form(p)
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
-        return kinetic_energy(self._m, x)
+        return kinetic_energy(self.form, x)
 
     def book(self, step, T):
         """Return the energies of a step, see the module."""
         x, _, end, integral, _, _, path = step
         k = self._k
         if type(path) is Pattern:
-            return linear_book(path.second, path.moments, path.losses, self._m, k.g_F, self._h, x,
+            return linear_book(path.second, path.moments, path.losses, self.form, k.g_F, self._h, x,
                                end, integral, T)
         u, parts = path
         lost = numerical = None
@@ -314,21 +324,31 @@ class PassiveMeter:
                 lost, numerical = more, taken
             else:
                 lost, numerical = tuple(map(add, lost, more)), numerical + taken
+        work = map(mul, T, self.angles(integral))
+        return *work, energy_gained(self.form, x, end), *self._of_elements(lost), numerical
+
+    def angles(self, integral):
+        """Return the angles of the shafts with a port from the integral of x, rad."""
+        k, (a_w, a_s) = self._k, integral
+        return (k.g_F or 1.0) * a_w, a_w + k.k_1 * a_s, a_w - k.k_2 * a_s
+
+    def lost_powers(self, flow, T, y, u, point):
+        """Return the power that each element loses at a ``point``, W."""
+        return self._of_elements(passive.lost_powers(self._k, u, point))
+
+    def _of_elements(self, lost):
+        """Return what the elements lose that there are, of those that ``passive`` knows."""
         drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0, *clutches = lost
-        lost = ((drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0)
-                if k.g_F else (drag, mesh_1, mesh_2, bearing_0))
-        if self._clutches:
-            lost += tuple(clutches)
-        (T_in, T_1, T_2), (a_w, a_s) = T, integral
-        return (T_in * (k.g_F or 1.0) * a_w, T_1 * (a_w + k.k_1 * a_s), T_2 * (a_w - k.k_2 * a_s),
-                energy_gained(self._m, x, end), *lost, numerical)
+        own = ((drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0) if self._k.g_F
+               else (drag, mesh_1, mesh_2, bearing_0))
+        return (*own, *clutches) if self._clutches else own
 
     def _part(self, u, part):
         """Return what the elements lost in a part of the path, and what its error took."""
-        k, (m_ww, m_ws, m_ss) = self._k, self._m
+        k, (m_ww, m_ws, m_ss) = self._k, self.form
         (w_0, s_0), f, J, _, h, (d_w, d_s), (c_w, c_s), _, straight, here, there = part
         if straight:
-            jump = kinetic_energy(self._m, (d_w, d_s))
+            jump = kinetic_energy(self.form, (d_w, d_s))
             return tuple([h * loss for loss in passive.lost_powers(k, u, there)]), jump
         (f_w, f_s), (J_ww, J_ws, J_sw, J_ss) = f, J
         inner, begin, end = rule_for(J, h, leads_far(w_0, s_0, d_w, d_s))

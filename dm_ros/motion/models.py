@@ -52,6 +52,7 @@ class SymmetricModel:
     """A symmetric differential under the paper's law; x is (omega_1, omega_2)."""
 
     lagged = False
+    half_shafts = ()
 
     def __init__(self, formulation, parameters, h):
         self.parameters, self.h = parameters, h
@@ -100,6 +101,8 @@ class SymmetricModel:
 class ClutchedModel:
     """A self-locking differential under the paper's law; x is (omega_0, omega_1 - omega_2)."""
 
+    half_shafts = ()
+
     def __init__(self, formulation, parameters, h):
         self.parameters, self.h = parameters, h
         self.responses = self._responses(formulation)
@@ -107,7 +110,7 @@ class ClutchedModel:
         self._g_12, self._g_2s = parameters.g_12, parameters.g_2s
         self._phi, self._preload = clutched.full_friction(parameters)
         # |M| of the last step feeds the friction of the next, which amplifies errors
-        self._tolerance = adaptive.TOLERANCE / 5 if self.lagged else adaptive.TOLERANCE
+        self.tolerance = adaptive.TOLERANCE / 5 if self.lagged else adaptive.TOLERANCE
         self.coefficients = {
             direction: clutched.coefficients(
                 parameters, response, not self.lagged, direction)
@@ -115,6 +118,10 @@ class ClutchedModel:
 
     def _responses(self, formulation):
         return responses_of(formulation, self.parameters)
+
+    def coefficients_of(self, direction):
+        """Return the ``Coefficients`` of a direction of power flow, see ``clutched``."""
+        return self.coefficients[direction]
 
     def independent(self, omega_1, omega_2):
         """Return x for the given speeds of the output shafts."""
@@ -137,7 +144,7 @@ class ClutchedModel:
         k = self.coefficients[direction]
         u = clutched.held(k, T, S)
         end, integral, point, coarse, parts = adaptive.step(
-            adaptive.PAPER, k, u, x, self.h, self._tolerance)
+            adaptive.PAPER, k, u, x, self.h, self.tolerance)
         return x, direction, end, integral, point, coarse, (u, parts)
 
     def point(self, x, S, T, direction):
@@ -195,6 +202,8 @@ class ClutchedSymmetricModel(ClutchedModel):
 class PassiveModel:
     """A differential under the passive law; x is (omega_0, omega_1 - omega_2)."""
 
+    half_shafts = ()
+
     def __init__(self, formulation, parameters, h, clutches):
         self.parameters, self.h, self.clutches = parameters, h, clutches
         self.lagged = getattr(formulation, 'lagged', False)
@@ -205,7 +214,11 @@ class PassiveModel:
         self._phi, self._preload = (clutched.full_friction(parameters) if clutches
                                     else ((0.0, 0.0), (0.0, 0.0)))
         self._g_2s = parameters.g_2s
-        self._tolerance = adaptive.TOLERANCE / 5   # signs that turn round make kinks
+        self.tolerance = adaptive.TOLERANCE / 5   # signs that turn round make kinks
+
+    def coefficients_of(self, flow):
+        """Return the ``Coefficients``, see ``passive``; nothing depends on the flow."""
+        return self.k
 
     def independent(self, omega_1, omega_2):
         """Return x for the given speeds of the output shafts."""
@@ -227,12 +240,12 @@ class PassiveModel:
 
     def step(self, x, S, T, flow):
         """Advance by h; see the module for what is returned."""
-        u = passive.held(T, S)
+        u = passive.held(self.k, T, S)
         return self._adaptive_step(x, u, flow)
 
     def point(self, x, S, T, flow):
         """Return the point at a state, see ``passive``."""
-        return passive.evaluate(self.k, passive.held(T, S), *x)
+        return passive.evaluate(self.k, passive.held(self.k, T, S), *x)
 
     def internal_moments(self, x, T, flow, point):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
@@ -247,7 +260,7 @@ class PassiveModel:
 
     def _adaptive_step(self, x, u, flow, here=None):
         end, integral, point, coarse, parts = adaptive.step(
-            adaptive.PASSIVE, self.k, u, x, self.h, self._tolerance, here)
+            adaptive.PASSIVE, self.k, u, x, self.h, self.tolerance, here)
         return x, flow, end, integral, point, coarse, (u, parts)
 
     def friction(self, memory, forces):
@@ -266,7 +279,7 @@ class PassiveSymmetricModel(PassiveModel):
 
     def step(self, x, S, T, flow):
         """Advance by h; see the module for what is returned."""
-        u, here = passive.held(T, S), None
+        u, here = passive.held(self.k, T, S), None
         patterns = self._patterns
         if patterns.has_one_at(x):
             guess = self._guess
@@ -284,7 +297,7 @@ class PassiveSymmetricModel(PassiveModel):
 
     def point(self, x, S, T, flow):
         """Return the pattern at a state, or its point where there is none."""
-        u = passive.held(T, S)
+        u = passive.held(self.k, T, S)
         return self._with_pattern(x, u, passive.evaluate(self.k, u, *x))
 
     def _with_pattern(self, x, u, point):

@@ -11,9 +11,10 @@ import math
 from operator import add
 
 from dm_ros.mechanism.power_flow import DIRECT
-from dm_ros.mechanism.variants import equipped, variant_named
+from dm_ros.mechanism.variants import equipped, PORT_TABLES, variant_named
 from dm_ros.motion.actuators import actuators_of
-from dm_ros.motion.models import LOSS_LAWS, model_of, PASSIVE
+from dm_ros.motion.coupled_model import model_with
+from dm_ros.motion.models import LOSS_LAWS, PASSIVE
 from dm_ros.motion.state import Snapshot, State
 
 NO_FORCE = (0.0, 0.0)   # on both clutches, where there are any
@@ -34,23 +35,27 @@ class Simulation:
     :param substeps: solver steps in a tick.
     :param power_flow_deadband: W, see ``dm_ros.mechanism.power_flow``.
     :param initial_velocity: speeds of the two output shafts at the start, rad/s.
+    :param ports: ``{shaft: (stiffness, damping)}`` of the input shafts where an outside speed comes
+        in instead of a torque, by an elastic shaft, N m/rad and N m s/rad.
     :raises ValueError: names what is wrong, its value and what is allowed.
     """
 
     def __init__(self, variant, dt=0.001, parameters=None, *, loss_law=PASSIVE, substeps=1,
-                 power_flow_deadband=0.0, initial_velocity=(0.0, 0.0)):
+                 power_flow_deadband=0.0, initial_velocity=(0.0, 0.0), ports=()):
         self._variant = variant_named(variant)
         self._model = None
         if loss_law not in LOSS_LAWS:
             raise ValueError(f'loss_law: {loss_law!r} is not one of {", ".join(LOSS_LAWS)}')
         self.loss_law = loss_law
         parameters = self._table({} if parameters is None else parameters)
-        self.mechanism = equipped(self._variant.mechanism, parameters)
+        self.mechanism = self._variant.mechanism
+        ports = self._checked_ports(ports)
+        self.mechanism = equipped(self.mechanism, parameters, ports)
         self.dt = checked('dt', dt, lambda v: v > 0.0, 'a positive number of seconds')
         self.power_flow_deadband = power_flow_deadband
         self.initial_velocity = initial_velocity
         self._substeps = None
-        self.adopt(self.prepare(parameters, substeps))
+        self.adopt(self.prepare(parameters, substeps, ports))
         self.reset()
 
     @property
@@ -153,6 +158,16 @@ class Simulation:
         self.adopt(self.prepare(parameters))
 
     @property
+    def ports(self):
+        """``{shaft: (stiffness, damping)}`` of the ports that take a speed, N m/rad, N m s/rad."""
+        return {shaft: (half_shaft.stiffness, half_shaft.damping) for shaft, half_shaft
+                in zip(self.mechanism.half_shafts, self._model.half_shafts)}
+
+    @ports.setter
+    def ports(self, ports):
+        self.adopt(self.prepare({}, ports=ports))
+
+    @property
     def state(self):
         """
         The ``State``, all that goes on from tick to tick but their number.
@@ -160,15 +175,15 @@ class Simulation:
         One that a simulation of the same variant, law and parameters had may be put back.
         """
         return State(self._x, self._turned, self._origin, self._torque, self._flow,
-                     self._memory, self._force)
+                     self._memory, self._force, self._held)
 
     @state.setter
     def state(self, state):
         (self._x, self._turned, self._origin, self._torque, self._flow,
-         self._memory, self._force) = state
+         self._memory, self._force, self._held) = state
         self._point = None
 
-    def prepare(self, parameters, substeps=None):
+    def prepare(self, parameters, substeps=None, ports=None):
         """
         Return what ``adopt`` takes, without touching this simulation.
 
@@ -177,6 +192,8 @@ class Simulation:
 
         :param parameters: as for the simulation itself; a mapping changes those in force.
         :param substeps: solver steps in a tick, None for those in force.
+        :param ports: stiffness and damping of the speed ports, None for those in force; which
+            ports are speed ports cannot change.
         :raises ValueError: names what is wrong, its value and what is allowed.
         """
         parameters = self._table(parameters)
@@ -185,8 +202,26 @@ class Simulation:
                              'any while it runs; friction_surfaces must be set at the start')
         substeps = checked('substeps', self._substeps if substeps is None else substeps,
                            lambda v: v >= 1 and v == int(v), 'a positive integer')
-        return (model_of(self._variant.formulation, self.mechanism, self.loss_law, parameters,
-                         self.dt / substeps), int(substeps))
+        ports = self.ports if ports is None else self._checked_ports(ports)
+        if set(ports) != set(self.mechanism.half_shafts):
+            raise ValueError('ports: which shafts take a speed cannot change while it runs')
+        return (model_with(ports, self._variant.formulation, self.mechanism, self.loss_law,
+                           parameters, self.dt / substeps), int(substeps))
+
+    def _checked_ports(self, ports):
+        """Return ``{shaft: (stiffness, damping)}`` as floats."""
+        result = {}
+        for shaft, pair in dict(ports).items():
+            if shaft not in self.inputs:
+                raise ValueError(f'ports: {shaft!r} is not one of {", ".join(self.inputs)}')
+            try:
+                stiffness, damping = pair
+            except (TypeError, ValueError):
+                raise ValueError(f'ports: {pair!r} of {shaft} is no stiffness and damping'
+                                 ) from None
+            table = PORT_TABLES[shaft](stiffness=stiffness, damping=damping)
+            result[shaft] = table.stiffness, table.damping
+        return result
 
     def _table(self, parameters):
         """Return a table of parameters, or those in force with a mapping of changes."""
@@ -209,7 +244,8 @@ class Simulation:
             self._origin = self._positions(old)
             self._turned = (0.0, 0.0)
             velocity = dict(zip(self.shafts, old.all_shafts(self._x)))
-            self._x = self._model.independent(*(velocity[shaft] for shaft in self.outputs))
+            outputs = (velocity[shaft] for shaft in self.outputs)
+            self._x = *self._model.independent(*outputs), *self._x[2:]   # and the twists
             self._point = None
 
     def reset(self):
@@ -217,11 +253,13 @@ class Simulation:
         self._ticks = 0
         self._coarse_steps = 0
         model = self._model
+        idle = tuple(port.idle for port in self.mechanism.ports)
+        twists = (0.0,) * len(self.mechanism.half_shafts)
         self.state = State(
-            x=model.independent(*self._initial_velocity), turned=(0.0, 0.0),
+            x=(*model.independent(*self._initial_velocity), *twists), turned=(0.0, 0.0),
             origin=(0.0,) * len(self.shafts), torque=(0.0,) * len(self.inputs),
             power_flow=DIRECT, memory=(0.0, 0.0) if model.lagged else (),
-            force=(0.0,) * len(self.clutches))
+            force=(0.0,) * len(self.clutches), held=idle)
 
     def step(self, torques, clutch_forces=NO_FORCE):
         """Advance one tick, as ``advance``, and return its ``Snapshot``."""
@@ -232,7 +270,9 @@ class Simulation:
         """
         Advance one tick; return the solver steps that did it, as ``models`` tells them.
 
-        :param torques: N m, in the order of ``inputs``, held in the tick.
+        :param torques: N m, in the order of ``inputs``, held in the tick. For a speed port it is
+            the speed outside instead, rad/s, or None where nothing holds the outside: the shaft
+            is free then, its twist is forgotten.
         :param clutch_forces: axial forces that the actuators are told to press the clutches with,
             N, in the order of ``clutches``, beside their preload. The force follows with the time
             constant of the actuator, up to its limit.
@@ -246,7 +286,7 @@ class Simulation:
         x, memory, flow = self._x, self._memory, self._flow
         lagged, point = model.lagged, self._point
         if lagged and point is None:
-            point = model.point(x, model.friction(memory, self._force), self._torque, flow)
+            point = model.point(x, model.friction(memory, self._force), self._held, flow)
         S = model.friction(memory, force)
         turned_1, turned_2 = self._turned
         coarse_steps = 0
@@ -258,17 +298,18 @@ class Simulation:
                     memory = model.remembered(point, was)
                     S = model.friction(memory, force)
                 step = model.step(x, S, T, flow)
-                _, _, x, (angle_1, angle_2), point, coarse, _ = step
-                turned_1 += angle_1
-                turned_2 += angle_2
+                _, _, x, integral, point, coarse, _ = step
+                turned_1 += integral[0]
+                turned_2 += integral[1]
                 coarse_steps += coarse
                 steps.append(step)
-            in_range = math.isfinite(x[0] + x[1] + turned_1 + turned_2)
+            in_range = math.isfinite(sum(x) + turned_1 + turned_2)
         except ArithmeticError:
             in_range = False
         if not in_range:
             raise ValueError(f'torques: {T} lead out of the range of floating point numbers')
-        self._x, self._turned, self._torque = x, (turned_1, turned_2), T
+        self._x, self._turned, self._held = x, (turned_1, turned_2), T
+        self._torque = model.mean_torques(T, steps) if model.half_shafts else T
         self._flow, self._memory, self._point, self._force = flow, memory, point, force
         self._coarse_steps += coarse_steps
         self._ticks += 1
@@ -279,20 +320,35 @@ class Simulation:
         return Snapshot(*self._report())
 
     def _report(self):
-        model, x, T, flow = self._model, self._x, self._torque, self._flow
+        model, x, T, flow = self._model, self._x, self._held, self._flow
         if self._point is None:
             self._point = model.point(x, model.friction(self._memory, self._force), T, flow)
-        return (self._ticks * self.dt, model.all_shafts(x), self._positions(model), T,
+        return (self._ticks * self.dt, model.all_shafts(x), self._positions(model), self._torque,
                 model.internal_moments(x, T, flow, self._point), flow, self._force)
 
     def _positions(self, model):
         return tuple(map(add, self._origin, model.all_shafts(self._turned)))
 
     def _checked_torques(self, torques):
+        if self._model.half_shafts:
+            return self._checked_inputs(torques)
         T = numbers_for('torques', torques, self.mechanism.ports)
         if not math.isfinite(sum(T)):   # as nearly never
             refuse('torques', T, self.mechanism.ports)
         return T
+
+    def _checked_inputs(self, inputs):
+        """Return the inputs where some ports take a speed, or None."""
+        ports = self.mechanism.ports
+        try:
+            free = [port.idle is None and value is None
+                    for port, value in zip(ports, inputs, strict=True)]
+        except (TypeError, ValueError):
+            free = []
+        given = (0.0 if gone else value for gone, value in zip(free, inputs)) if free else inputs
+        values = numbers_for('torques', given, ports)
+        refuse('torques', values, ports)
+        return tuple([None if gone else value for gone, value in zip(free, values)])
 
     def _pressed(self, commands):
         """Return the forces in force in the next tick."""

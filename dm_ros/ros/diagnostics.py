@@ -84,20 +84,22 @@ class Diagnostics:
         plant = self._node.plant
         inputs, simulation = plant.inputs, plant.simulation
         silent, stale = inputs.silent(), inputs.stale(simulation.ticks)
+        mechanism = simulation.mechanism
+        without = {port.kind: [other.name for other in mechanism.ports + mechanism.actuators
+                               if other.kind == port.kind and other.name in silent]
+                   for port in mechanism.ports + mechanism.actuators}
         shafts = [name for name in silent if name in simulation.inputs]
-        clutches = [name for name in silent if name not in simulation.inputs]
         forces = zip(simulation.mechanism.actuators, simulation.state.force)
         return self._status(
-            'torques', active(plant.refusing, plant.clamping, plant.stale),
+            'torques', active(plant.refusing, plant.clamping, plant.stale, plant.freed),
             'no torque yet' if len(shafts) == len(simulation.inputs) else 'fine', {
                 'received messages': inputs.received,
                 'refused messages': inputs.refused,
                 'last refused': plant.refusing.reason or 'none',
                 'clamped messages': inputs.clamped,
                 'stale': ', '.join(stale) or 'none',
-                'without any torque yet': ', '.join(shafts) or 'none',
-                **({'without any force yet': ', '.join(clutches) or 'none'}
-                   if simulation.clutches else {}),
+                **{f'without any {kind} yet': ', '.join(names) or 'none'
+                   for kind, names in without.items()},
                 **{f'force on {clutch.name} [N]': f'{force:g}' for clutch, force in forces}})
 
     def _connections(self):

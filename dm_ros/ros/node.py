@@ -20,6 +20,7 @@ from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from dm_ros.ending import run_command
+from dm_ros.motion.held_inputs import Joints
 from dm_ros.motion.pacing import Pacer
 from dm_ros.plant import Plant
 from dm_ros.ros.diagnostics import Diagnostics
@@ -102,11 +103,13 @@ class DifferentialNode(Node):
         self._diagnostics = Diagnostics(self)
         # the steady clock: a timer of the ROS clock stalls when system time steps back
         self.create_timer(1.0, self.diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        simulation = self.simulation
-        forces = f', forces on {", ".join(clutches)}' if (clutches := simulation.clutches) else ''
-        self.get_logger().info(
-            f'{settings.variant} at {settings.rate:g} Hz, {settings.mode}, {settings.loss_law} '
-            f'law of losses, torques on {", ".join(simulation.inputs)}{forces}')
+        mechanism = self.simulation.mechanism
+        inputs = {'torques': [port.name for port in mechanism.ports if port.kind == 'torque'],
+                  'speeds': mechanism.half_shafts, 'forces': mechanism.clutches}
+        self.get_logger().info(', '.join([
+            f'{settings.variant} at {settings.rate:g} Hz', settings.mode,
+            f'{settings.loss_law} law of losses',
+            *(f'{kind} on {", ".join(names)}' for kind, names in inputs.items() if names)]))
 
     @property
     def simulation(self):
@@ -180,7 +183,8 @@ class DifferentialNode(Node):
     def lockstep_tick(self, message):
         """Advance one tick with a message and answer it, or refuse both."""
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        if self.plant.take(message.name, message.effort, '~/torques', stamp, sparse=True):
+        joints = Joints(message.effort, message.velocity)
+        if self.plant.take(message.name, joints, '~/torques', stamp, sparse=True):
             self._advance()
 
     def _followed_tick(self):

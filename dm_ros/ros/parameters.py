@@ -5,7 +5,7 @@
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
-from dm_ros.mechanism.variants import variant_named
+from dm_ros.mechanism.variants import PORT_TABLES, variant_named
 from dm_ros.ros.privates import given_parameters
 from dm_ros.settings import known_rows, NodeParameters
 
@@ -40,8 +40,10 @@ def declare_all(node):
     mechanism = variant_named(settings.variant).mechanism
     not_mine = [f'initial_velocity.{shaft}' for shaft in ('left', 'right', 'front', 'rear')
                 if shaft not in mechanism.outputs]
-    return {**declare(node, settings, given, not_mine),
-            **declare(node, mechanism.parameters(), given)}
+    started = declare(node, settings, given, not_mine)
+    for table in (mechanism.parameters, *(PORT_TABLES[shaft] for shaft in mechanism.inputs)):
+        started |= declare(node, table(), given)
+    return started
 
 
 def declare(node, table, given, not_mine=()):

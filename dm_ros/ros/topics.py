@@ -7,6 +7,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int8
 
+from dm_ros.motion.held_inputs import Joints
 from dm_ros.ros.messages import (
     LATEST_QOS,
     LOCKSTEP_INPUT_QOS,
@@ -31,7 +32,7 @@ class Inputs:
             return node.create_subscription(message_type, topic, never_called, qos,
                                             callback_group=polled)
         mechanism = plant.simulation.mechanism
-        topics = {f'~/torque/{shaft}': shaft for shaft in mechanism.inputs}
+        topics = {f'~/{port.kind}/{port.name}': port.name for port in mechanism.ports}
         topics.update((f'~/clutch/{clutch}', actuator.name)
                       for clutch, actuator in zip(mechanism.clutches, mechanism.actuators))
         self._single = [] if plant.lockstep else [
@@ -48,7 +49,8 @@ class Inputs:
             for message, _ in poll(subscription):
                 self._plant.take((port,), (message.data,), topic)
         for message, _ in poll(self.torques):
-            self._plant.take(message.name, message.effort, '~/torques', sparse=True)
+            self._plant.take(message.name, Joints(message.effort, message.velocity), '~/torques',
+                             sparse=True)
 
     def discard(self):
         """Drop all waiting messages on ``~/torques``; return their number."""
