@@ -32,6 +32,7 @@ from dm_ros.motion.adaptive import (
 )
 from dm_ros.motion.quadrature import FINE, lobatto, STIFF
 
+MOST_TRIALS = 2000   # of parts; a light gear on a shaft without damping swings often in a tick
 MOST_LOOKS = 32      # along a part that swings
 TERMS = 12           # of the series of an exponential, enough for matrices below 1/4
 MOST_KEPT = 64       # exponentials that are kept
@@ -333,7 +334,7 @@ def step(equations, z, h, tolerance, exponentials):
     left = part = h
     here = equations.at(z)
     J = equations.jacobian(here)
-    for _ in range(law.most_trials):
+    for _ in range(MOST_TRIALS):
         e = exponentials.of(J, part)
         d = part * (e.first @ here.slope)
 
