@@ -81,12 +81,12 @@ def torque_bias(p, torque=math.inf, direction=DIRECT, forces=(0.0, 0.0)):
     """
     if not torque > 0.0:
         raise ValueError(f'torque: {torque!r} is not allowed, it must be above 0 N m')
-    split, bias = kinds(p)
+    split, bias = _kinds(p)
     return bias(*(split(*_outputs(p, torque, direction, forces, sigma))
                   for sigma in ((-1, 1), (1, -1))))
 
 
-def kinds(p):
+def _kinds(p):
     """Return the types of split and limits that parameters have."""
     return (AxleSplit, AxleBias) if isinstance(p, SymmetricParameters) else (Split, Bias)
 
@@ -144,10 +144,11 @@ def forces_for(p, side, share, torque, direction=DIRECT, pressed=(1.0, 1.0)):
     :param direction: as in ``torque_bias``; -1 for the share that comes from that side.
     :param pressed: the proportion of both forces: (0.0, 1.0) presses the second clutch alone.
     :return: the smallest such forces, zeros where the clutches do it by themselves; None where
-        no forces in this proportion do it. The limits of the actuators do not count.
+        no forces in this proportion do it: without friction, or where the share tends to less as
+        they grow. The limits of the actuators do not count.
     :raises ValueError: for another side or share, or as ``torque_bias``.
     """
-    sides = kinds(p)[0]._fields
+    sides = _kinds(p)[0]._fields
     if side not in sides:
         raise ValueError(f'side: {side!r} is not one of {", ".join(sides)}')
     if not 0.0 <= share <= 1.0:
