@@ -17,9 +17,9 @@ An actuator's force A_k adds f_k R_k A_k to S_k; in reverse flow, where the shaf
 scaled by the coast factor. With both values of sigma this gives the limits of the split; all
 splits between them are held by friction, with the shafts locked.
 
-The symmetric differential has the same equations with g_12 = 1, where T_0 is what the final drive
-gives to the carrier, (40): g_F T_3 eta_3B eta_FG in direct flow, g_F T_3/(eta_3B eta_FG) in reverse
-flow.
+The symmetric differential has the same equations with g_12 = 1. T_0 is what the final drive gives
+to its carrier then: g_F T_3 eta_3B eta_FG in direct flow, (40), and g_F T_3/(eta_3B eta_FG) in
+reverse flow, (38)-(39).
 """
 
 import math

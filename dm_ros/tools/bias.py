@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Print how far the clutches of a differential can shift torque, or what force shifts it so far."""
+"""Print how far the clutches of a differential can shift torque, or what force it takes."""
 
 import argparse
 import math
@@ -56,7 +56,7 @@ def answer(p, side, percent, torque, direction=DIRECT):
     found, beyond = [], []
     for pressed in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
         forces = forces_for(p, side, percent / 100, torque, direction, pressed)
-        if forces is None:
+        if forces is None or all(pressed) and not all(p.f):
             continue
         if not any(forces):
             index = sides.index(side)
