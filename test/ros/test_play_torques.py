@@ -15,7 +15,6 @@ from sensor_msgs.msg import JointState
 from dm_ros.mechanism.variants import MECHANISMS
 from dm_ros.tools.play_torques import load, parser
 
-
 PRESETS = Path(__file__).parents[2] / 'config' / 'presets'
 
 
