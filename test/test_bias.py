@@ -256,7 +256,7 @@ def test_the_force_for_a_share_makes_it_a_limit(direction, pressed):
     needed = 0
     for p, torque in nearly_even(count=40):
         p = dataclasses.replace(p, c_1=0.4, c_2=0.1)
-        sides = torque_bias(p, torque)[0]._fields
+        sides = p.shafts
         for index, side in enumerate(sides):
             low, high = sorted(s.share[index] for s in torque_bias(p, torque, direction))
             for share in (0.0, 0.02, 0.5, 0.9, 1.0):
@@ -276,7 +276,7 @@ def test_the_force_for_a_share_makes_it_a_limit(direction, pressed):
 @pytest.mark.parametrize('direction', BOTH)
 def test_the_shafts_slip_steadily_at_the_share_that_a_force_reaches(direction):
     for p, torque in nearly_even(count=6):
-        for index, side in enumerate(torque_bias(p, torque)[0]._fields):
+        for index, side in enumerate(p.shafts):
             forces = forces_for(p, side, 0.95, torque, direction, (1.0, 1.0))
             if not any(forces):
                 continue

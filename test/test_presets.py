@@ -98,7 +98,7 @@ def test_the_table_of_the_page_says_what_bias_prints(preset):
     for torque, direction in ((math.inf, DRIVE), (1000.0, DRIVE), (1000.0, COAST)):
         limits = torque_bias(table_of(preset), torque, direction)
         most = {side: f'{100 * max(split.share[i] for split in limits):.1f} %'
-                for i, side in enumerate(limits[0]._fields)}
+                for i, side in enumerate(table_of(preset).shafts)}
         left, right = most.values()
         cells.append(left if left == right
                      else ', '.join(f'{side} {share}' for side, share in most.items()))

@@ -148,7 +148,7 @@ def forces_for(p, side, share, torque, direction=DIRECT, pressed=(1.0, 1.0)):
         they grow. The limits of the actuators do not count.
     :raises ValueError: for another side or share, or as ``torque_bias``.
     """
-    sides = _kinds(p)[0]._fields
+    sides = p.shafts
     if side not in sides:
         raise ValueError(f'side: {side!r} is not one of {", ".join(sides)}')
     if not 0.0 <= share <= 1.0:

@@ -37,7 +37,7 @@ self-locking one. The limits of the actuators are those of FILE.
 def sentence(p, torque, direction=DIRECT, forces=(0.0, 0.0)):
     """Return one line on the limits at a carrier torque in N m, or at a large one, infinite."""
     limits = torque_bias(p, torque, direction, forces)
-    one, other = limits[0]._fields
+    one, other = p.shafts
     first, second = (_range(side) for side in zip(*(split.share for split in limits)))
     if direction == DIRECT:
         return (f'this parameter set can send {first} of {_in_words(torque)} to the {one} '
@@ -49,7 +49,7 @@ def sentence(p, torque, direction=DIRECT, forces=(0.0, 0.0)):
 def answer(p, side, percent, torque, direction=DIRECT):
     """Return one line on the forces with which a share, in percent, can go to a side."""
     limits = torque_bias(p, torque, direction)
-    sides = limits[0]._fields
+    sides = p.shafts
     words = _in_words(torque)
     what = (f'{percent:g} % of {words} can go to the {side}' if direction == DIRECT else
             f'{percent:g} % of {words} that brakes the carrier can come from the {side}')
