@@ -22,6 +22,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', glob('config/*.yaml') + glob('config/*.xml')),
+        (f'share/{NAME}/config/presets', glob('config/presets/*.yaml')),
     ],
     zip_safe=True,
     python_requires='>=3.11',

@@ -7,29 +7,56 @@ import dataclasses
 import math
 from pathlib import Path
 
-from mechanisms import BOTH, PassiveFlow, random_self_locking
+from mechanisms import BOTH, PassiveFlow, random_self_locking, random_symmetric
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from dm_ros import SelfLockingParameters, Simulation
-from dm_ros.bias import friction_for, torque_bias
-from dm_ros.mechanism.clutched import slip_steepness
+from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters
+from dm_ros.bias import forces_for, friction_for, torque_bias
+from dm_ros.mechanism.clutched import full_friction, slip_steepness
 from dm_ros.tools.bias import main
 
 
 def without_drag(p):
-    return dataclasses.replace(p, l_0=0.0, l_1=0.0, l_2=0.0, l_s=0.0)
+    return dataclasses.replace(p, **{f.name: 0.0 for f in dataclasses.fields(p)
+                                     if f.name.startswith('l_')})
+
+
+def axle(rng):
+    """Return random parameters of a symmetric differential with clutches."""
+    p = random_symmetric(rng)
+    n_F1, n_F2 = (int(n) for n in rng.integers(1, 10, 2))
+    R, R_F = p.R * rng.uniform(0.7, 1.4), p.R * rng.uniform(0.7, 1.4)
+    limit = min(p.eta_1G, p.eta_2G) * p.eta_0B * R / R_F / math.tan(p.alpha)
+    return dataclasses.replace(
+        p, R=R, R_F1=R_F, R_F2=R_F, n_F1=n_F1, n_F2=n_F2, mu_1=rng.uniform(0, 0.9) * limit / n_F1,
+        mu_2=rng.uniform(0, 0.9) * limit / n_F2, N_1=rng.uniform(0, 500), N_2=rng.uniform(0, 500),
+        c_f1=rng.uniform(1, 8), c_f2=rng.uniform(1, 8))
 
 
 def mechanisms(count=3, seed=1):
     """Yield parameters without viscous drag, those of Table 2 first, and a carrier torque."""
     rng = np.random.default_rng(seed)
     yield without_drag(SelfLockingParameters()), 300.0
-    for _ in range(count):
-        p = without_drag(random_self_locking(rng))
-        preload = p.f[0] * p.n_s * p.N_1 * p.R_1 + p.f[1] * p.n_s * p.N_2 * p.R_2
-        yield p, 2.0 * preload + rng.uniform(50, 300)   # enough to turn both shafts
+    for kind in (random_self_locking, axle):
+        for _ in range(count):
+            p = without_drag(kind(rng))
+            preload = sum(full_friction(p)[1])
+            yield p, 2.0 * preload + rng.uniform(50, 300)   # enough to turn both shafts
+
+
+def nearly_even(count):
+    """Yield mechanisms whose gears do not split so unevenly that a force turns one limit round."""
+    return ((p, torque) for p, torque in mechanisms(count) if 0.6 < p.g_12 < 1.7)
+
+
+def driving_torque(p, torque, direction):
+    """Return the torque on the driving shaft that makes one on the carrier."""
+    if isinstance(p, SelfLockingParameters):
+        return direction * torque
+    losses = (p.eta_3B * p.eta_FG)**direction
+    return direction * torque / p.g_F / losses
 
 
 def turning(p, torque, split, direction, slip, ticks, far=math.inf, forces=(0.0, 0.0)):
@@ -38,10 +65,11 @@ def turning(p, torque, split, direction, slip, ticks, far=math.inf, forces=(0.0,
 
     It ends early when the slip is as large as ``far``.
     """
-    simulation = Simulation('lsd_ode', 1e-3, p,
+    variant = 'lsd_ode' if isinstance(p, SelfLockingParameters) else 'symmetric_ode'
+    simulation = Simulation(variant, 1e-3, p,
                             initial_velocity=(2000.0 + slip / 2, 2000.0 - slip / 2))
     start = simulation.snapshot().velocity
-    torques = [direction * torque, *(-direction * side for side in split)]
+    torques = [driving_torque(p, torque, direction), *(-direction * side for side in split)]
     slips = [slip]
     for _ in range(ticks):
         velocity = simulation.step(torques, forces).velocity
@@ -72,7 +100,7 @@ def test_the_limits_know_forces_and_coast_factors(direction):
             _, start, end = turning(p, 3 * torque, split, direction, 800.0 * sign, 100,
                                     forces=forces)
             assert end == pytest.approx(start, abs=1e-6)
-            assert abs(split.share.front - plain.share.front) > 0.01
+            assert abs(split.share[0] - plain.share[0]) > 0.01
 
 
 @pytest.mark.parametrize('direction', BOTH)
@@ -219,6 +247,72 @@ def test_torque_too_small_against_the_preload_is_refused():
         torque_bias(SelfLockingParameters(eta_1G=0.8, eta_2G=0.8), 0.1)
 
 
+# What force it takes
+
+
+@pytest.mark.parametrize('direction', BOTH)
+@pytest.mark.parametrize('pressed', [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.3, 2.0)])
+def test_the_force_for_a_share_makes_it_a_limit(direction, pressed):
+    needed = 0
+    for p, torque in nearly_even(count=40):
+        p = dataclasses.replace(p, c_1=0.4, c_2=0.1)
+        sides = p.shafts
+        for index, side in enumerate(sides):
+            low, high = sorted(s.share[index] for s in torque_bias(p, torque, direction))
+            for share in (0.0, 0.02, 0.5, 0.9, 1.0):
+                forces = forces_for(p, side, share, torque, direction, pressed)
+                if low <= share <= high:
+                    assert forces == (0.0, 0.0)
+                    continue
+                needed += 1
+                assert min(forces) >= 0.0 < max(forces)
+                assert forces[0] * pressed[1] == pytest.approx(forces[1] * pressed[0])
+                limits = sorted(s.share[index]
+                                for s in torque_bias(p, torque, direction, forces))
+                assert limits[share > high] == pytest.approx(share, abs=1e-12)
+    assert needed > 100
+
+
+@pytest.mark.parametrize('direction', BOTH)
+def test_the_shafts_slip_steadily_at_the_share_that_a_force_reaches(direction):
+    for p, torque in nearly_even(count=6):
+        for index, side in enumerate(p.shafts):
+            forces = forces_for(p, side, 0.95, torque, direction, (1.0, 1.0))
+            if not any(forces):
+                continue
+            share = [0.05, 0.05]
+            share[index] = 0.95
+            limits = torque_bias(p, torque, direction, forces)
+            split, sign = max(zip(limits, (-1, 1), strict=True), key=lambda x: x[0][index])
+            assert split == pytest.approx([sum(split) * s for s in share])
+            _, start, end = turning(p, torque, split, direction, 800.0 * sign, 100, forces=forces)
+            assert end == pytest.approx(start, abs=1e-6)
+
+
+def test_no_force_on_a_clutch_without_surfaces_helps():
+    p = SymmetricParameters(n_F1=8)
+    assert forces_for(p, 'right', 0.8, 300.0, pressed=(0.0, 1.0)) is None
+    assert forces_for(SymmetricParameters(), 'right', 0.8, 300.0) is None
+    alone = forces_for(p, 'right', 0.8, 300.0, pressed=(1.0, 0.0))
+    # the clutch takes half of the difference from the left and gives it to the carrier
+    assert forces_for(p, 'right', 0.8, 300.0) == pytest.approx((alone[0], alone[0]))
+
+
+@pytest.mark.parametrize('arguments, message', [
+    (('left', 0.8, 300.0), 'front, rear'), (('rear', 1.1, 300.0), 'share: 1.1'),
+    (('rear', math.nan, 300.0), 'share: nan'), (('rear', 0.8, math.inf), 'torque: inf')])
+def test_impossible_shares_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        forces_for(SelfLockingParameters(), *arguments)
+
+
+def test_an_open_symmetric_differential_splits_evenly_whatever_it_loses():
+    for direction in BOTH:
+        for limit in torque_bias(SymmetricParameters(), 300.0, direction):
+            assert limit.share == pytest.approx((0.5, 0.5))
+            assert sum(limit) == pytest.approx(300.0 * (0.99 * 0.995) ** direction)
+
+
 # The command
 
 
@@ -235,6 +329,46 @@ def test_command_says_the_limits_in_two_lines(capsys):
         assert f'    {line}\n' in text
 
 
+@pytest.mark.parametrize('arguments, line', [
+    (['--share-to', 'rear', '80'],
+     '80 % of 300 N m can go to the rear by pressing the rear clutch with 721 N, or the front '
+     'clutch with 4079 N, or both clutches with 613 N each'),
+    (['--share-to', 'rear', '70 %'],
+     '70 % of 300 N m can go to the rear without any force: 35.0 % to 74.2 %')])
+def test_command_says_what_force_it_takes(arguments, line, capsys):
+    assert main(arguments) == 0
+    assert capsys.readouterr().out == f'{line}\n'
+    assert f'    {line}\n' in (Path(__file__).parents[1] / 'doc' / 'bias.md').read_text()
+
+
+def test_command_tells_when_no_force_or_none_that_is_allowed_is_enough(capsys, tmp_path):
+    assert main(['--mechanism', 'symmetric', '--share-to', 'left', '60']) == 0
+    assert 'to the left by no force' in capsys.readouterr().out
+    path = tmp_path / 'p.yaml'
+    path.write_text('/**: {ros__parameters: {lsd.clutch.rear.actuator_limit: 700.0}}')
+    ask = ['--params', str(path), '--share-to', 'rear']
+    main([*ask, '80'])   # both are pressed alike, and the front one has no such limit
+    assert ('by pressing the front clutch with 4079 N, or both clutches with 613 N each'
+            in capsys.readouterr().out)
+    path.write_text('/**: {ros__parameters: {lsd.clutch.rear.actuator_limit: 700.0, '
+                    'lsd.clutch.front.actuator_limit: 600.0}}')
+    main([*ask, '80'])
+    assert 'only with forces above actuator_limit: the rear' in capsys.readouterr().out
+
+
+def test_command_takes_the_mechanism_from_the_file(capsys, tmp_path):
+    path = tmp_path / 'p.yaml'
+    for text, side in (('symmetric.clutch.left.friction_surfaces: 4', 'left'),
+                       ('lsd.clutch.rear.preload: 1.0', 'rear'), ('rate: 100.0', 'rear'),
+                       ('{variant: symmetric_dae, lsd.pressure_angle: 0.3}', 'left')):
+        text = text if text.startswith('{') else f'{{{text}}}'
+        path.write_text(f'/**: {{ros__parameters: {text}}}')
+        main(['--params', str(path)])
+        assert f'to the {side}' in capsys.readouterr().out
+        main(['--params', str(path), '--mechanism', 'lsd'])
+        assert 'to the rear' in capsys.readouterr().out
+
+
 def test_command_reads_parameters_and_the_direction(capsys, tmp_path):
     path = tmp_path / 'p.yaml'
     path.write_text('/**: {ros__parameters: {lsd: {clutch: {front: {friction_surfaces: 2}}}}}')
@@ -247,7 +381,9 @@ def test_command_reads_parameters_and_the_direction(capsys, tmp_path):
 
 @pytest.mark.parametrize('arguments, message', [
     (['--torque', '0'], '--torque: 0.0'), (['--torque', 'nan'], '--torque: nan'),
-    (['--torque', 'inf'], '--torque: inf'),
+    (['--torque', 'inf'], '--torque: inf'), (['--share-to', 'rear', '120'], 'from 0 to 100'),
+    (['--share-to', 'rear', 'all'], 'from 0 to 100'),
+    (['--share-to', 'left', '60'], 'front, rear'),
     (['--params', 'nowhere.yaml'], 'nowhere.yaml: No such')])
 def test_command_refuses_bad_input_in_one_line(arguments, message, capsys):
     assert main(arguments) == 2

@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Print how far the clutches of a self-locking differential can shift torque."""
+"""Print how far the clutches of a differential can shift torque, or what force it takes."""
 
 import argparse
 import math
@@ -9,48 +9,116 @@ import sys
 
 from dm_ros.ending import run_command
 from dm_ros.files.parameter_file import read_parameter_file
-from dm_ros.mechanism.bias import torque_bias
-from dm_ros.mechanism.parameters import SelfLockingParameters
+from dm_ros.mechanism.bias import forces_for, torque_bias
 from dm_ros.mechanism.power_flow import DIRECT
+from dm_ros.mechanism.variants import MECHANISMS, SELF_LOCKING, variant_named
+
+DESCRIPTION = """\
+Print how far the clutches of a differential can shift torque between its output shafts, with a
+driving carrier and full slip; or what force on which clutch it takes for a share of the torque.
+"""
+EPILOG = """\
+What force sends 80 % to the rear at 300 N m?
+
+  bias --torque 300 --share-to rear 80
+
+The shares are of what both output shafts get together. Below some torque the preload and the
+forces on the clutches turn one of them round: its share is negative then. Beside a large torque
+neither counts.
+
+The torque on the carrier of a symmetric differential is that of the pinion times the final drive
+ratio, less what pinion bearing and final drive lose.
+
+The mechanism is that of the variant in FILE, or the only one with parameters in FILE, or else the
+self-locking one. The limits of the actuators are those of FILE.
+"""
 
 
 def sentence(p, torque, direction=DIRECT, forces=(0.0, 0.0)):
     """Return one line on the limits at a carrier torque in N m, or at a large one, infinite."""
-    words = 'a large torque' if math.isinf(torque) else f'{torque:g} N m'
-    limits = []
-    for side in zip(*(split.share for split in torque_bias(p, torque, direction, forces))):
-        limits.append('{:.1f} % to {:.1f} %'.format(*sorted(100 * share for share in side)))
-    front, rear = limits
+    limits = torque_bias(p, torque, direction, forces)
+    one, other = p.shafts
+    first, second = (_range(side) for side in zip(*(split.share for split in limits)))
     if direction == DIRECT:
-        return (f'this parameter set can send {front} of {words} to the front '
-                f'and {rear} to the rear')
-    return (f'this parameter set can take {front} of {words} that brakes the carrier '
-            f'from the front and {rear} from the rear')
+        return (f'this parameter set can send {first} of {_in_words(torque)} to the {one} '
+                f'and {second} to the {other}')
+    return (f'this parameter set can take {first} of {_in_words(torque)} that brakes the carrier '
+            f'from the {one} and {second} from the {other}')
+
+
+def answer(p, side, percent, torque, direction=DIRECT):
+    """Return one line on the forces with which a share, in percent, can go to a side."""
+    limits = torque_bias(p, torque, direction)
+    sides = p.shafts
+    words = _in_words(torque)
+    what = (f'{percent:g} % of {words} can go to the {side}' if direction == DIRECT else
+            f'{percent:g} % of {words} that brakes the carrier can come from the {side}')
+    found, beyond = [], []
+    for pressed in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
+        forces = forces_for(p, side, percent / 100, torque, direction, pressed)
+        if forces is None or all(pressed) and not all(p.f):
+            continue
+        if not any(forces):
+            index = sides.index(side)
+            return f'{what} without any force: {_range(split.share[index] for split in limits)}'
+        allowed = all(force <= limit for force, limit in zip(forces, (p.A_1, p.A_2)))
+        (found if allowed else beyond).append((all(pressed), math.ceil(max(forces)), pressed))
+    ways = ', or '.join(
+        f'both clutches with {force} N each' if both else
+        f'the {sides[pressed.index(1.0)]} clutch with {force} N'
+        for both, force, pressed in sorted(found or beyond))
+    if found:
+        return f'{what} by pressing {ways}'
+    if beyond:
+        return f'{what} only with forces above actuator_limit: {ways}'
+    return f'{what} by no force on the clutches' + ('' if any(p.f) else ': they have no friction')
+
+
+def _in_words(torque):
+    return 'a large torque' if math.isinf(torque) else f'{torque:g} N m'
+
+
+def _range(shares):
+    """Return shares as a range in percent, or as one number where both ends are."""
+    low, high = (f'{100 * share:.1f} %' for share in sorted(shares))
+    return low if low == high else f'{low} to {high}'
 
 
 def parser():
     """Return the parser of the command line."""
     result = argparse.ArgumentParser(
-        'bias', description='Print how far the clutches of a self-locking differential can '
-        'shift torque between front and rear, with a driving carrier and full slip.',
-        epilog='The shares are of what both output shafts get together. Below some torque the '
-        'preload and the forces on the clutches turn one of them round: its share is negative '
-        'then. Beside a large torque neither counts.')
+        'bias', description=DESCRIPTION, epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
+    result.add_argument('--mechanism', choices=MECHANISMS,
+                        help='which differential; default: that of FILE, see below')
     result.add_argument('--torque', type=float, default=300.0, metavar='N',
                         help='torque on the carrier, N m; default: %(default)g')
-    result.add_argument('--forces', type=float, nargs=2, default=(0.0, 0.0),
-                        metavar=('FRONT', 'REAR'),
-                        help='forces of the actuators on the clutches, N; default: none')
+    forces = result.add_mutually_exclusive_group()
+    forces.add_argument('--forces', type=float, nargs=2, default=(0.0, 0.0), metavar='N',
+                        help='forces of the actuators on the clutches, N: front and rear, or left '
+                        'and right; default: none')
+    forces.add_argument('--share-to', nargs=2, metavar=('SIDE', 'PERCENT'),
+                        help='what force sends this share to a side: front, rear, left or right')
     result.add_argument('--reverse', action='store_true',
                         help='for driving output shafts and a braking carrier')
     return result
 
 
+def mechanism_of(values):
+    """Return the ``Mechanism`` that the values of a parameter file are for."""
+    if 'variant' in values:
+        return variant_named(values['variant']).mechanism
+    found = [m for m in MECHANISMS.values() if m.parameters.part_of(values)]
+    return found[0] if len(found) == 1 else SELF_LOCKING
+
+
 def run(arguments):
     """Do what the command line says; raise ValueError or OSError where it cannot be done."""
     values = read_parameter_file(arguments.params) if arguments.params else {}
-    p = SelfLockingParameters().changed(SelfLockingParameters.part_of(values))
+    mechanism = (MECHANISMS[arguments.mechanism] if arguments.mechanism
+                 else mechanism_of(values))
+    p = mechanism.parameters().changed(mechanism.parameters.part_of(values))
     if not 0.0 < arguments.torque < math.inf:
         raise ValueError(f'--torque: {arguments.torque!r} is not allowed, '
                          'it must be a number of N m above 0')
@@ -58,8 +126,29 @@ def run(arguments):
         if not 0.0 <= force < math.inf:
             raise ValueError(f'--forces: {force!r} is not allowed, it must be a number of N, '
                              'at least 0')
+    direction = -DIRECT if arguments.reverse else DIRECT
+    if arguments.share_to:
+        side, percent = share_to(arguments.share_to, mechanism)
+        print(answer(p, side, percent, arguments.torque, direction))
+        return
     for torque in (arguments.torque, math.inf):
-        print(sentence(p, torque, -DIRECT if arguments.reverse else DIRECT, arguments.forces))
+        print(sentence(p, torque, direction, arguments.forces))
+
+
+def share_to(words, mechanism):
+    """Return side and percent of the option; raise ValueError where they are none."""
+    side, text = words
+    if side not in mechanism.outputs:
+        raise ValueError(f'--share-to: {side!r} is not one of {", ".join(mechanism.outputs)}, '
+                         f'the output shafts of the {mechanism.title}')
+    try:
+        percent = float(text.rstrip(' %'))
+    except ValueError:
+        percent = math.nan
+    if not 0.0 <= percent <= 100.0:
+        raise ValueError(f'--share-to: {text!r} is not allowed, it must be a number of percent '
+                         'from 0 to 100: no force sends more than all to one side')
+    return side, percent
 
 
 def main(args=None):

@@ -103,6 +103,11 @@ def compare(arguments):
     chosen, source = loads(arguments)
     if arguments.params:
         source += f' The parameters come from {arguments.params}.'
+    for mechanism in chosen:
+        table = mechanism.parameters
+        if table().changed(table.part_of(values)).has_clutches and not mechanism.clutches:
+            raise ValueError(f'{arguments.params}: {mechanism.name}.clutch: the {mechanism.title} '
+                             'of the paper has no clutches, friction_surfaces must be 0 here')
     files = {}
     comparisons, both_laws = [], []
     longest = inf if arguments.duration is None else arguments.duration

@@ -16,14 +16,15 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 
 from dm_ros.ending import ignore_signals, run_command
+from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS, WITH_CLUTCHES
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
-FILE is a CSV as `simulate` reads it: a header "time,<shaft>,..." with every input shaft, and a
+CSV is a file as `simulate` reads it: a header "time,<shaft>,..." with every input shaft, and a
 row's torques hold until the time of the next row, those of the last row beyond it. Forces on
-clutches, in columns <clutch>_clutch, are played where FILE has any. Without --duration the last
+clutches, in columns <clutch>_clutch, are played where CSV has any. Without --duration the last
 time ends the playing. All goes to the topic <node>/torques, in one message. At the end, and on
 Ctrl-C or SIGTERM as well, zeros are published so that no load stays behind.
 """
@@ -38,11 +39,13 @@ def parser():
                         help='the variant that the node runs: it decides the input shafts and '
                         'the built-in load; default: %(default)s')
     family.add_argument('--profile', choices=MECHANISMS, help='the same by the mechanism alone')
-    result.add_argument('--torques', metavar='FILE', help='play this CSV, not the built-in load')
+    family.add_argument('--params', metavar='FILE',
+                        help='the same by the variant in the ROS 2 parameter file of the node')
+    result.add_argument('--torques', metavar='CSV', help='play this file, not the built-in load')
     result.add_argument('--rate', type=_positive, default=100.0, metavar='HZ',
                         help='messages in a second; default: 100')
     result.add_argument('--duration', type=_positive, metavar='S',
-                        help='how long to play; default: to the end of FILE, or endless')
+                        help='how long to play; default: to the end of CSV, or endless')
     result.add_argument('--node', default='/differential', metavar='NAME',
                         help='name of the differential node; default: %(default)s')
     result.add_argument('--wait', type=_not_negative, default=10.0, metavar='S',
@@ -123,8 +126,9 @@ def load(arguments):
     :raises ValueError: for a CSV that is not as it should be.
     """
     rate, count = arguments.rate, None
+    values = read_parameter_file(arguments.params) if arguments.params else {}
     mechanism = (MECHANISMS[arguments.profile] if arguments.profile
-                 else variant_named(arguments.variant).mechanism)
+                 else variant_named(values.get('variant', arguments.variant)).mechanism)
     names, clutches = mechanism.inputs, WITH_CLUTCHES[mechanism.name].clutch_moments
     if arguments.torques:
         held = read_torque_file(arguments.torques, names, clutches).held(1 / rate)

@@ -38,8 +38,8 @@ OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), 
 (N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse), clutch_force.<clutch> (N): a row
 for the start, then one for the end of each tick. Without --out and --plot it goes to stdout.
 
-Of FILE, a ROS 2 parameter file, these count: the parameters of the mechanism, loss_law, rate,
-substeps, power_flow_deadband and initial_velocity.
+Of FILE, a ROS 2 parameter file, these count: variant, the parameters of the mechanism, loss_law,
+rate, substeps, power_flow_deadband and initial_velocity.
 """
 
 
@@ -47,8 +47,8 @@ def parser():
     """Return the parser of the command line."""
     result = argparse.ArgumentParser('simulate', description=__doc__, epilog=EPILOG,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    result.add_argument('--variant', required=True, choices=VARIANTS,
-                        help='the mechanism and its formulation')
+    result.add_argument('--variant', choices=VARIANTS,
+                        help='the mechanism and its formulation; default: variant of FILE')
     result.add_argument('--loss-law', choices=LOSS_LAWS,
                         help='what gears and bearings lose; default: loss_law of FILE, '
                         f'else {NodeParameters().loss_law}')
@@ -88,7 +88,10 @@ def run(arguments):
     values = read_parameter_file(arguments.params) if arguments.params else {}
     if arguments.loss_law:
         values['loss_law'] = arguments.loss_law
-    simulation = make_simulation(arguments.variant, values, arguments.dt)
+    variant = arguments.variant or values.get('variant')
+    if variant is None:
+        raise ValueError('--variant: it is needed where no FILE has the parameter variant')
+    simulation = make_simulation(variant, values, arguments.dt)
     table = read_torque_file(arguments.torques, simulation.inputs,
                              simulation.mechanism.clutch_moments)
     try:
@@ -114,7 +117,7 @@ def run(arguments):
             raise ValueError(f'{arguments.torques}: after {simulation.time:g} s: '
                              f'{error}') from None
         if arguments.plot:
-            Record(simulation, np.frombuffer(numbers), arguments.variant).draw(picture)
+            Record(simulation, np.frombuffer(numbers), variant).draw(picture)
     speeds = zip(simulation.shafts, simulation.snapshot().velocity, strict=True)
     print(f'simulate: {len(torques)} ticks, {simulation.time:.6g} s, final speeds in rad/s:',
           ', '.join(f'{shaft} {speed:.6g}' for shaft, speed in speeds), file=sys.stderr)

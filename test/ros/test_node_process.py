@@ -36,6 +36,17 @@ def test_its_parameter_file_loads(ros, name):
         assert process.ended(signal.SIGTERM) == 0
 
 
+@pytest.mark.parametrize('preset, words', [
+    ('centre_40_60', 'lsd_ode at 200 Hz'), ('plate_axle_1_5_way', 'forces on left, right'),
+    ('open_axle', 'torques on pinion, left, right\n')])
+def test_a_preset_loads_with_its_variant(ros, preset, words):
+    with start('--ros-args', '--params-file', CONFIG / 'presets' / f'{preset}.yaml') as process:
+        joints = ros.listen(JointState, '/differential/joint_states')
+        ros.until(lambda: joints)
+        assert process.ended(signal.SIGTERM) == 0
+        assert words in process.errors
+
+
 @pytest.mark.parametrize('parameter, words', [
     ('symmetric.efficiency.left_mesh:=1.5', ['symmetric.efficiency.left_mesh', '1.5', '(0, 1]']),
     ('symmetric.satellite_count:=0', ['symmetric.satellite_count', '0']),

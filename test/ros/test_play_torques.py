@@ -4,6 +4,7 @@
 """``play_torques`` over real topics, as a process of its own."""
 
 from contextlib import ExitStack
+from pathlib import Path
 import signal
 
 from processes import command, Forked
@@ -13,6 +14,8 @@ from sensor_msgs.msg import JointState
 
 from dm_ros.mechanism.variants import MECHANISMS
 from dm_ros.tools.play_torques import load, parser
+
+PRESETS = Path(__file__).parents[2] / 'config' / 'presets'
 
 
 @pytest.fixture
@@ -33,7 +36,8 @@ def listen(ros, topic='/differential/torques'):
 @pytest.mark.parametrize('arguments, profile, names', [
     ([], 'symmetric', ['pinion', 'left', 'right']),
     (['--profile', 'lsd'], 'lsd', ['carrier', 'front', 'rear']),
-    (['--variant', 'lsd_dae'], 'lsd', ['carrier', 'front', 'rear'])])
+    (['--variant', 'lsd_dae'], 'lsd', ['carrier', 'front', 'rear']),
+    (['--params', PRESETS / 'centre_40_60.yaml'], 'lsd', ['carrier', 'front', 'rear'])])
 def test_plays_a_built_in_load_and_ends_with_zero(ros, play, arguments, profile, names):
     messages = listen(ros)
     process = play(*arguments, '--rate', 200, '--duration', 0.5, '--wait', 60)
@@ -119,6 +123,7 @@ def test_drives_the_node(ros, play):
     (['--rate', '0'], '--rate: 0 must be above 0'),
     (['--duration', 'nan'], '--duration: nan must be in'),
     (['--profile', 'lsd', '--variant', 'lsd_ode'], 'not allowed with'),
+    (['--params', 'missing.yaml'], 'missing.yaml: No such file'),
     (['--what'], 'unrecognized arguments'),
     (['--ros-args', '-r', 'what'], "remap rule: '-r what'"),
     (['--ros-args', '--what'], '--what')])
