@@ -18,7 +18,6 @@ import sys
 from car import LimitedSlip
 from car_nodes import EVERY_MESSAGE
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
@@ -50,11 +49,14 @@ class LimitedSlipNode(Node):
 
 def main(args=None):
     """Run the node until SIGINT or SIGTERM; return the exit code."""
+    rclpy.init(args=args)
     try:
-        rclpy.init(args=args)
         rclpy.spin(LimitedSlipNode())
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         pass
+    except Exception:
+        if rclpy.ok():   # otherwise it is the shutdown, which may break a call
+            raise
     finally:
         rclpy.try_shutdown()
     return 0
