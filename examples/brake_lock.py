@@ -6,8 +6,8 @@ What helps a car on a hill with its left wheel on ice: a brake, plates, clutches
 
 open    the open differential: the wheel on ice spins up and the car hardly moves
 brake   the same, and a controller brakes the spinning wheel: torque reaches the other one
-lsd     the self-locking differential as an axle differential: plates, and no controller
-els     electronic limited slip: a controller presses clutches, which are open without it
+plates  an axle with plates, pressed together by preload and load, and no controller
+els     electronic limited slip: a controller presses the same plates, which are open without it
 
 The differential, the car and the controller are ROS 2 nodes in lockstep, one message a tick.
 With --direct the same classes call each other, to the same bits.
@@ -15,15 +15,17 @@ With --direct the same classes call each other, to the same bits.
 
 import argparse
 from dataclasses import dataclass
+import math
 from pathlib import Path
 import sys
 from typing import NamedTuple
 
 from car import (
+    ASPHALT,
     BrakeLock,
     Car,
     CarParameters,
-    final_drive_ratio,
+    ICE,
     LimitedSlip,
     with_wheels_and_engine,
 )
@@ -32,7 +34,7 @@ import numpy as np
 from dm_ros.files.record import Record
 from dm_ros.testing import DirectDifferential, LockstepDifferential
 
-RATE = 1000.0   # Hz
+VARIANT, RATE = 'symmetric_ode', 1000.0   # Hz
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,24 +42,28 @@ class Case:
     """A differential in the car, and its controller."""
 
     name: str
-    variant: str
     title: str
     controller: type = None   # BrakeLock or LimitedSlip
     parameters: tuple = ()    # of (name, value), beside those of wheels and engine
 
 
-# An axle with equal gears and clutches that are open but for their actuators.
-DRIVEN_CLUTCHES = (
-    ('lsd.crown_radius.front', 0.06),
-    ('lsd.pressure_angle', 0.0),
-    *((f'lsd.clutch.{clutch}.{name}', value) for clutch in ('front', 'rear') for name, value in (
-        ('friction_surfaces', 5), ('radius', 0.06), ('preload', 0.0),
-        ('actuator_time_constant', 0.05))))
+def on_both_sides(**clutch):
+    """Return the parameters of two equal clutches as (name, value)."""
+    return tuple((f'symmetric.clutch.{side}.{name}', value)
+                 for side in ('left', 'right') for name, value in clutch.items())
+
+
+PACKS = (('symmetric.satellite_count', 4), ('symmetric.side_gear_radius', 0.05),
+         *on_both_sides(friction_surfaces=4, friction_coefficient=0.1, radius=0.055))
+# A 2-way plate axle: ramps of 45 degrees on drive and on coast, and a preload of 62 N m a side.
+PLATES = (*PACKS, ('symmetric.pressure_angle', math.radians(45.0)), *on_both_sides(preload=700.0))
+# The same packs, without ramps and preload: only pistons press them.
+PISTONS = (*PACKS, ('symmetric.pressure_angle', 0.0), *on_both_sides(actuator_time_constant=0.05))
 CASES = (
-    Case('open', 'symmetric_ode', 'open differential'),
-    Case('brake', 'symmetric_ode', 'brake lock', BrakeLock),
-    Case('lsd', 'lsd_ode', 'self-locking, plates'),
-    Case('els', 'lsd_ode', 'electronic limited slip', LimitedSlip, DRIVEN_CLUTCHES),
+    Case('open', 'open differential'),
+    Case('brake', 'brake lock', BrakeLock),
+    Case('plates', 'limited slip by plates', parameters=PLATES),
+    Case('els', 'electronic limited slip', LimitedSlip, PISTONS),
 )
 
 
@@ -72,12 +78,7 @@ class Run(NamedTuple):
 
 def parameters_of(case, p=None):
     """Return the parameters that the differential of a case has in the car."""
-    return {**with_wheels_and_engine(case.variant, p or CarParameters()), **dict(case.parameters)}
-
-
-def make_car(case, rate=RATE, p=None):
-    """Return the ``Car`` of a case."""
-    return Car(1.0 / rate, p, final_drive_ratio(case.variant))
+    return {**with_wheels_and_engine(VARIANT, p or CarParameters()), **dict(case.parameters)}
 
 
 def attach(differential, case, rate=RATE, p=None):
@@ -85,7 +86,7 @@ def attach(differential, case, rate=RATE, p=None):
     from car_nodes import BrakeLockNode, CarNode  # only those who use topics need ROS
     from limited_slip import LimitedSlipNode
 
-    car, inputs = make_car(case, rate, p), differential.simulation.inputs
+    car, inputs = Car(1.0 / rate, p), differential.simulation.inputs
     context, demands = differential.context, None
     if case.controller is BrakeLock:
         demands = 'brake_demands'
@@ -99,32 +100,32 @@ def attach(differential, case, rate=RATE, p=None):
 
 def law_of(differential, case, rate=RATE, p=None):
     """Return the law for a ``DirectDifferential`` that does the same, and its ``Car``."""
-    car, lock, limited_slip = make_car(case, rate, p), BrakeLock(1.0 / rate), LimitedSlip()
+    car, lock, limited_slip = Car(1.0 / rate, p), BrakeLock(1.0 / rate), LimitedSlip()
     simulation = differential.simulation
     index = simulation.shafts.index
-    drive, left, right = map(index, simulation.inputs)
+    pinion, left, right = map(index, simulation.inputs)
     carrier, clutched = index('carrier'), tuple(map(index, simulation.clutches))
 
     def law(snapshot):
         speeds = snapshot.velocity
         wheels = speeds[left], speeds[right]
         brakes = lock.brakes(wheels) if case.controller is BrakeLock else (0.0, 0.0)
-        torques = car.torques(speeds[drive], wheels, brakes)
+        torques = car.torques(speeds[pinion], wheels, brakes)
         if case.controller is not LimitedSlip:
             return torques
         return torques, tuple(limited_slip.force(speeds[k] - speeds[carrier]) for k in clutched)
     return law, car
 
 
-def run(case, seconds, direct=False):
-    """Return the ``Run`` of a case, from rest."""
+def run(case, seconds, direct=False, p=None):
+    """Return the ``Run`` of a case, from rest, with the ``CarParameters`` p."""
     if direct:
-        differential = DirectDifferential(case.variant, RATE, parameters=parameters_of(case))
-        law, car = law_of(differential, case)
+        differential = DirectDifferential(VARIANT, RATE, parameters=parameters_of(case, p))
+        law, car = law_of(differential, case, p=p)
         record = differential.run(law, seconds)
     else:
-        with LockstepDifferential(case.variant, RATE, parameters_of(case)) as differential:
-            car = attach(differential, case)
+        with LockstepDifferential(VARIANT, RATE, parameters_of(case, p)) as differential:
+            car = attach(differential, case, p=p)
             record = differential.run(seconds)
     return as_run(case, record, car)
 
@@ -133,7 +134,7 @@ def as_run(case, record, car):
     """Return the ``Run`` of a record and of the car that made its torques."""
     # the car is at the start of each tick; it may already have answered the last state
     _, speed, *brakes = np.array(car.history[:len(record)]).T
-    _, *wheels = (record.velocity[name] for name in record.torque)
+    wheels = record.velocity['left'], record.velocity['right']
     powers = {
         'brakes': [brake * np.tanh(wheel / car.p.brake_soft_speed) * wheel
                    for brake, wheel in zip(brakes, wheels)],
@@ -149,18 +150,13 @@ def report(runs):
              f'{"brakes":>8}{"clutches":>10}',
              f'{"":8}{"m/s":>6}{"rad/s":>8}{"N m":>12}{"N m":>12}{"kN":>8}{"kJ":>8}{"kJ":>10}']
     for case, record, car, heat in runs:
-        _, _, right = record.torque.values()
+        right = record.torque['right']
         force = max((values.max() for values in record.clutch_force.values()), default=0.0)
         lines.append(f'{case.name:8}{car["speed"][-1]:6.2f}{abs(record.slip).max():8.1f}'
                      f'{car["left_brake"].max():12.0f}{-right.min():12.0f}{force / 1e3:8.1f}'
                      f'{heat["brakes"] / 1e3:8.1f}{heat["clutches"] / 1e3:10.1f}')
     return [*lines, '', 'speed at the end; the greatest slip, torques and force of an actuator; '
             'all heat']
-
-
-def meshes(record):
-    """Return the moments that the gears give to the left and the right shaft, N m."""
-    return [values for name, values in record.moment.items() if name.endswith('_mesh')]
 
 
 def clutch_moments(record):
@@ -172,7 +168,7 @@ def clutch_moments(record):
 LEFT, RIGHT, CONTROLLER = '#1f6fb5', '#d1441f', '#222222'   # colours
 LEFT_CLUTCH, RIGHT_CLUTCH = '#8ab8de', '#eda58f'
 CASE_COLOURS = '#888888', '#222222', '#2a8a3e', '#8e44ad'
-FORCE_SCALE = 10.0   # N of an actuator drawn as 1 N m
+FORCE_SCALE = 20.0   # N of an actuator drawn as 1 N m
 
 
 def save_plot(runs, path):
@@ -214,10 +210,16 @@ def save_plot(runs, path):
 
 def draw_cars(ax, runs, end):
     """Draw the speeds of the cars, each with its name."""
-    for (case, record, car, _), colour in zip(runs, CASE_COLOURS):
-        ax.plot(record.time, car['speed'], color=colour, linewidth=1.8)
-        ax.annotate(case.title, (record.time[-1], car['speed'][-1]), xytext=(5, 0),
-                    textcoords='offset points', va='center', color=colour)
+    for run, colour in zip(runs, CASE_COLOURS):
+        ax.plot(run.record.time, run.car['speed'], color=colour, linewidth=1.8)
+    names = sorted((run.car['speed'][-1], run.case.title, colour)
+                   for run, colour in zip(runs, CASE_COLOURS))
+    room, height = 0.09 * max(ax.get_ylim()), -math.inf
+    for speed, title, colour in names:   # from below, so that none covers another
+        height = max(speed, height + room)
+        ax.annotate(title, (end, height), xytext=(5, 0), textcoords='offset points',
+                    va='center', color=colour)
+    ax.set_ylim(top=max(ax.get_ylim()[1], height + 0.5 * room))
     ax.set_ylabel('speed of the car, m/s')
     ax.set_xlim(0.0, end * 1.16)   # room for the names
     ax.set_xticks([tick for tick in ax.get_xticks() if tick <= end])
@@ -227,9 +229,8 @@ def draw_cars(ax, runs, end):
 def draw_wheels(ax, run):
     """Draw the speeds of the wheels; the title tells the slip and the heat."""
     case, record, _, heat = run
-    _, left, right, *_ = record.velocity.values()
-    ax.plot(record.time, left, color=LEFT, label='left, on ice')
-    ax.plot(record.time, right, color=RIGHT, label='right, on asphalt')
+    ax.plot(record.time, record.velocity['left'], color=LEFT, label='left, on ice')
+    ax.plot(record.time, record.velocity['right'], color=RIGHT, label='right, on asphalt')
     ax.set_title(f'{case.title}\nslip ≤ {abs(record.slip).max():.1f} rad/s; '
                  f'brakes, clutches {sum(heat.values()) / 1e3:.1f} kJ', fontsize='medium')
 
@@ -237,9 +238,9 @@ def draw_wheels(ax, run):
 def draw_moments(ax, run):
     """Draw the moments on the shafts, and what the controller does."""
     _, record, car, _ = run
-    left, right = meshes(record)
-    ax.plot(record.time, right, color=RIGHT, linewidth=3.0, alpha=0.55, label='gear, right shaft')
-    ax.plot(record.time, left, color=LEFT, label='gear, left shaft')
+    ax.plot(record.time, record.moment['right_mesh'], color=RIGHT, linewidth=3.0, alpha=0.55,
+            label='gear, right shaft')
+    ax.plot(record.time, record.moment['left_mesh'], color=LEFT, label='gear, left shaft')
     for moment, (colour, label) in zip(clutch_moments(record).values(), (
             (LEFT_CLUTCH, 'clutch, left shaft: > 0 slows it'),
             (RIGHT_CLUTCH, 'clutch, right shaft: < 0 drives it'))):
@@ -264,6 +265,13 @@ def positive(text):
     return number
 
 
+def grip(text):
+    number = float(text)
+    if not 0.0 <= number <= 2.0:
+        raise argparse.ArgumentTypeError(f'{text} is not in [0, 2]')
+    return number
+
+
 def main(args=None):
     """Run the four cases; return the exit code."""
     parser = argparse.ArgumentParser(
@@ -273,10 +281,13 @@ def main(args=None):
                         help='where the picture and the CSVs go, default run')
     parser.add_argument('--seconds', type=positive, default=5.0, metavar='S',
                         help='simulated time of a case, default 5')
+    parser.add_argument('--ice', type=grip, default=ICE, metavar='GRIP',
+                        help=f'friction coefficient of the tyre on ice, default {ICE}')
     parser.add_argument('--direct', action='store_true', help='without topics and ROS')
     arguments = parser.parse_args(args)
     arguments.out.mkdir(parents=True, exist_ok=True)
-    runs = [run(case, arguments.seconds, arguments.direct) for case in CASES]
+    p = CarParameters(grip=(arguments.ice, ASPHALT))
+    runs = [run(case, arguments.seconds, arguments.direct, p) for case in CASES]
     for done in runs:
         done.record.save_csv(arguments.out / f'{done.case.name}.csv')
     save_plot(runs, arguments.out / 'example.png')

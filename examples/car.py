@@ -13,8 +13,7 @@ middle-class car in first gear.
 from dataclasses import dataclass
 import math
 
-from dm_ros.mechanism.parameters import SymmetricParameters
-from dm_ros.mechanism.variants import SYMMETRIC, variant_named
+from dm_ros.mechanism.variants import variant_named
 
 ASPHALT, ICE = 0.95, 0.12   # greatest friction coefficients of a tyre
 GRAVITY = 9.81              # m/s^2
@@ -51,31 +50,21 @@ def with_wheels_and_engine(variant, p):
     """
     mechanism = variant_named(variant).mechanism
     own, (driven, *wheels) = mechanism.parameters().named(), mechanism.inputs
-    attached = {driven: p.engine_inertia * final_drive_ratio(variant)**2,
-                **dict.fromkeys(wheels, p.wheel_inertia)}
+    attached = {driven: p.engine_inertia, **dict.fromkeys(wheels, p.wheel_inertia)}
     return {(name := f'{mechanism.name}.inertia.{shaft}'): own[name] + inertia
             for shaft, inertia in attached.items()}
-
-
-def final_drive_ratio(variant):
-    """Return the ratio between engine and driven shaft; the symmetric differential has its own."""
-    return 1.0 if variant_named(variant).mechanism is SYMMETRIC else SymmetricParameters().g_F
 
 
 class Car:
     """
     Engine, tyres, brakes and the way of the car, at the same tick as the differential.
 
-    A self-locking differential has its carrier where the other one has its pinion: the final
-    drive is then a part of the car, without losses.
-
-    :param dt: length of a tick, s.
-    :param final_drive: pinion speed over the speed of the shaft that the engine drives here: 1
-        for a symmetric differential, which brings its own.
+    The final drive is a part of the differential.
     """
 
-    def __init__(self, dt, parameters=None, final_drive=1.0):
-        self.dt, self.p, self.final_drive = dt, parameters or CarParameters(), final_drive
+    def __init__(self, dt, parameters=None):
+        """:param dt: length of a tick, s."""
+        self.dt, self.p = dt, parameters or CarParameters()
         self._brake_part = 1.0 - math.exp(-dt / self.p.brake_lag)
         self.restart()
 
@@ -84,14 +73,14 @@ class Car:
         self.ticks, self.speed, self.brakes = 0, 0.0, (0.0, 0.0)
         self.history = []   # of (s, m/s, N m, N m): time, car, left and right brake
 
-    def torques(self, drive_speed, wheel_speeds, brake_demands):
+    def torques(self, pinion_speed, wheel_speeds, brake_demands):
         """
         Advance the car by a tick; return the torques of the differential in it, N m.
 
-        :param drive_speed: rad/s, of the shaft that the engine drives.
+        :param pinion_speed: rad/s.
         :param wheel_speeds: rad/s, left and right.
         :param brake_demands: N m, left and right.
-        :return: torques on the driven shaft, the left and the right one.
+        :return: torques on the pinion, the left and the right shaft.
         """
         p, time = self.p, self.ticks * self.dt
         self.brakes = tuple(held + self._brake_part * (demand - held)
@@ -101,12 +90,12 @@ class Car:
         left, right = (
             -p.wheel_radius * force - brake * math.tanh(speed / p.brake_soft_speed)
             for force, brake, speed in zip(forces, self.brakes, wheel_speeds))
-        drive = self.engine_torque(time, drive_speed * self.final_drive) * self.final_drive
+        pinion = self.engine_torque(time, pinion_speed)
         resistance = p.mass * GRAVITY * (p.grade + p.rolling_resistance)
         # the driver does not let it roll back
         self.speed = max(0.0, self.speed + self.dt * (sum(forces) - resistance) / p.mass)
         self.ticks += 1
-        return drive, left, right
+        return pinion, left, right
 
     def tyre_force(self, wheel_speed, grip):
         """Return the force of a tyre on the road, N, by a Magic Formula of three terms."""
@@ -167,8 +156,8 @@ class LimitedSlip:
     """
 
     threshold: float = 1.5    # rad/s, by which a wheel may differ from the carrier, as in a bend
-    gain: float = 4000.0      # N s/rad
-    limit: float = 10_000.0   # N, what the actuator can do
+    gain: float = 8000.0      # N s/rad
+    limit: float = 15_000.0   # N, what the actuator can do
 
     def force(self, slip):
         """Return the axial force on a clutch, N, at its slip, rad/s; 0 if nobody knows that."""

@@ -61,7 +61,7 @@ class CarNode(Node):
 
     in   ``differential/joint_states`` and the demands   out  ``differential/torques``
 
-    :param car: a ``Car``; inputs: names of the driven, the left and the right shaft.
+    :param car: a ``Car``; inputs: names of the pinion, the left and the right shaft.
     :param demands: the topic of a controller that is to be waited for, None without one.
     """
 
@@ -99,8 +99,8 @@ class CarNode(Node):
                 raise RuntimeError('the demands do not answer the joint states')
             demanded = dict(zip(demands.name, demands.effort))
             brakes = [demanded.pop(wheel, 0.0) for wheel in self._inputs[1:]]
-            drive, *wheels = speeds(joints, self._inputs)
-            torques = self.car.torques(drive, wheels, brakes)
+            pinion, *wheels = speeds(joints, self._inputs)
+            torques = self.car.torques(pinion, wheels, brakes)
             self._torques.publish(JointState(
                 header=joints.header, name=[*self._inputs, *demanded],
                 effort=[*torques, *demanded.values()]))

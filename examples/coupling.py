@@ -9,9 +9,10 @@ as a tyre is, and gets a small push. Torques are exchanged once a tick. The push
 grows; a bisection finds where the one turns into the other.
 """
 
+from dataclasses import replace
 import sys
 
-from brake_lock import CASES, law_of, parameters_of
+from brake_lock import CASES, law_of, parameters_of, PLATES, VARIANT
 from car import CarParameters, with_wheels_and_engine
 import numpy as np
 
@@ -24,12 +25,16 @@ GEAR = SymmetricParameters()
 PUSH = (0.011, -0.009)   # rad/s
 TICKS = 800
 CAR = CarParameters()
-OPEN_CAR = with_wheels_and_engine('symmetric_ode', CAR)
-LSD_CAR = with_wheels_and_engine('lsd_ode', CAR)
+OPEN_CAR = with_wheels_and_engine(VARIANT, CAR)
+# the engine drives the carrier by a final drive of its own
+LSD_CAR = with_wheels_and_engine(
+    'lsd_ode', replace(CAR, engine_inertia=CAR.engine_inertia * GEAR.g_F**2))
 SLIPPING = {'lsd.clutch.front.friction_surfaces': 0, 'lsd.clutch.rear.friction_surfaces': 0}
 CARS = (   # what, variant, parameters, which wheels have grip
-    ('car of the example, both wheels on asphalt', 'symmetric_ode', OPEN_CAR, (1.0, 1.0)),
-    ('the same, the left wheel without grip', 'symmetric_ode', OPEN_CAR, (0.0, 1.0)),
+    ('car of the example, both wheels on asphalt', VARIANT, OPEN_CAR, (1.0, 1.0)),
+    ('the same, the left wheel without grip', VARIANT, OPEN_CAR, (0.0, 1.0)),
+    ('car of the example with plates, both wheels on asphalt', VARIANT,
+     {**OPEN_CAR, **dict(PLATES)}, (1.0, 1.0)),
     ('self-locking, clutches taken out', 'lsd_ode', {**LSD_CAR, **SLIPPING}, (1.0, 1.0)),
     ('self-locking, left (front) wheel without grip, clutches taken out', 'lsd_ode',
      {**LSD_CAR, **SLIPPING}, (0.0, 1.0)),
@@ -217,7 +222,7 @@ def car_slope(p):
 def chatter(rate, seconds=1.5):
     """Return the part of ticks at which the torque of the tyre on asphalt turns, brake lock on."""
     case = CASES[1]
-    differential = DirectDifferential(case.variant, rate, parameters=parameters_of(case))
+    differential = DirectDifferential(VARIANT, rate, parameters=parameters_of(case))
     torque = differential.run(law_of(differential, case, rate)[0], seconds).torque['right']
     steps = np.diff(torque)
     return float((steps[1:] * steps[:-1] < 0.0).mean())

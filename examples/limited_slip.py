@@ -1,13 +1,14 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""
+r"""
 A controller node: an electronic limited slip for any differential with clutches.
 
 In real time, beside a node ``differential`` and whoever gives the torques::
 
-    ros2 run dm_ros differential --ros-args -p variant:=lsd_ode
-    python examples/limited_slip.py --ros-args -p gain:=4000.0 -p threshold:=1.5
+    ros2 run dm_ros differential --ros-args -p symmetric.pressure_angle:=0.0 \
+      -p symmetric.clutch.left.friction_surfaces:=4 -p symmetric.clutch.right.friction_surfaces:=4
+    python examples/limited_slip.py --ros-args -p gain:=8000.0 -p threshold:=1.5
 
 It may be started and stopped at any time: without it the forces grow stale, and the clutches open.
 """
@@ -18,7 +19,6 @@ import sys
 from car import LimitedSlip
 from car_nodes import EVERY_MESSAGE
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
@@ -50,11 +50,14 @@ class LimitedSlipNode(Node):
 
 def main(args=None):
     """Run the node until SIGINT or SIGTERM; return the exit code."""
+    rclpy.init(args=args)
     try:
-        rclpy.init(args=args)
         rclpy.spin(LimitedSlipNode())
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         pass
+    except Exception:
+        if rclpy.ok():   # otherwise it is the shutdown, which may break a call
+            raise
     finally:
         rclpy.try_shutdown()
     return 0

@@ -4,6 +4,7 @@
 """The worked example without topics, and the stability limit of doc/coupling.md."""
 
 from dataclasses import replace
+from functools import cache
 import math
 from pathlib import Path
 import re
@@ -22,40 +23,79 @@ from dm_ros.mechanism.variants import variant_named
 from dm_ros.testing import DirectDifferential
 
 ROOT = Path(__file__).parents[1]
-OPEN, BRAKE, LSD, ELS = brake_lock.CASES
+OPEN, BRAKE, PLATES, ELS = brake_lock.CASES
+NO_PRELOAD = replace(PLATES, parameters=(*PLATES.parameters,
+                                         *brake_lock.on_both_sides(preload=0.0)))
 PAGE = (ROOT / 'doc' / 'coupling.md').read_text()
+EXAMPLE = (ROOT / 'doc' / 'example.md').read_text()
 
 
-def table_after(heading):
-    """Return the rows of the first table of doc/coupling.md whose head begins so, as words."""
-    rows = PAGE.split(heading, 1)[1].split('\n\n', 1)[0].splitlines()[2:]
+def table_after(heading, page=PAGE):
+    """Return the rows of the first table of a page whose head begins so, as words."""
+    rows = page.split(heading, 1)[1].split('\n\n', 1)[0].splitlines()[2:]
     return [[cell.strip() for cell in row.strip('|').split('|')] for row in rows]
 
 
+@cache
+def on_ice(case, ice=brake_lock.ICE, seconds=5.0, other=brake_lock.ASPHALT):
+    """Return the ``Run`` of a case with a grip under the left and the other wheel, kept."""
+    p = brake_lock.CarParameters(grip=(ice, other))
+    return brake_lock.run(case, seconds, direct=True, p=p)
+
+
 def test_the_lock_brings_torque_to_the_wheel_on_asphalt():
-    runs = {case.name: brake_lock.run(case, 3.0, direct=True) for case in brake_lock.CASES}
-    speeds = {name: run.car['speed'][-1] for name, run in runs.items()}
-    assert speeds['open'] < 0.25
-    assert speeds['brake'] > speeds['lsd'] > 1.5
+    free, braked = (on_ice(case, seconds=3.0) for case in (OPEN, BRAKE))
+    assert free.car['speed'][-1] < 0.25 < 1.5 < braked.car['speed'][-1]
     # the torque of the tyre on the right shaft is what drives the car, a load: negative
-    tyre = {name: -list(run.record.torque.values())[2][-1] for name, run in runs.items()}
-    assert tyre['open'] < 120.0 < 200.0 < tyre['lsd'] < tyre['brake']
+    assert -free.record.torque['right'][-1] < 120.0 < 380.0 < -braked.record.torque['right'][-1]
     # the open differential halves; what the brake takes on the left is given to the right
-    moment = runs['brake'].record.moment
+    moment = braked.record.moment
     assert moment['left_mesh'][-1] == pytest.approx(moment['right_mesh'][-1], rel=0.01)
 
 
-def of_axle(case, seconds, **changes):
-    """Return the ``Run`` of a case in a car with other parameters."""
-    p = brake_lock.CarParameters(**changes)
-    differential = DirectDifferential(case.variant, brake_lock.RATE,
-                                      parameters=brake_lock.parameters_of(case, p))
-    law, car = brake_lock.law_of(differential, case, p=p)
-    return brake_lock.as_run(case, differential.run(law, seconds), car)
+@pytest.mark.parametrize(('ice', 'spins'), [(0.12, False), (0.08, True), (0.0, True)])
+def test_the_plates_multiply_what_the_ice_bears_and_add_their_preload(ice, spins):
+    """The page: a side bears 62 N m and 0.44 of its gear, so one gets 2.57 L + 220 N m."""
+    record = on_ice(PLATES, ice).record
+    assert (record.slip.max() > 20.0) == spins   # rad/s
+    slipping = record.slip > 2.0
+    assert slipping[-1]
+    moment = {name: values[slipping] for name, values in record.moment.items()}
+    assert moment['left_clutch'] == pytest.approx(61.6 + 0.44 * moment['left_mesh'], rel=0.01)
+    taken, given = (moment[f'{side}_mesh'] - moment[f'{side}_clutch']
+                    for side in ('left', 'right'))
+    assert given == pytest.approx(2.57 * taken + 220.0, rel=0.01)
+    # at last the wheels hardly speed up, and the tyres have it all
+    left, right = (-record.torque[side][-1] for side in ('left', 'right'))
+    assert right == pytest.approx(2.57 * left + 220.0, rel=0.03)
+
+
+def test_the_plates_just_hold_the_wheel_and_the_brake_lock_gives_the_same_on_any_ice():
+    assert on_ice(PLATES).record.slip.max() < 6.5            # rad/s
+    assert on_ice(PLATES, ice=0.11).record.slip.max() > 40.0
+    for ice in (brake_lock.ICE, 0.08, 0.04, 0.0):
+        record = on_ice(BRAKE, ice).record
+        assert -record.torque['right'][record.time > 1.0] == pytest.approx(400.0, abs=12.0)
+    force = on_ice(ELS, ice=0.0).record.clutch_force['left']
+    assert force[-1] == pytest.approx(brake_lock.LimitedSlip().limit, rel=1e-6)
+
+
+def test_plates_help_either_wheel_alike():
+    left = on_ice(PLATES, seconds=2.0)
+    right = on_ice(PLATES, brake_lock.ASPHALT, seconds=2.0, other=brake_lock.ICE)
+    assert left.car['speed'][-1] == pytest.approx(right.car['speed'][-1], rel=1e-6)
+
+
+def test_the_table_of_the_grips_says_what_the_command_says():
+    rows = table_after('| grip of the ice', EXAMPLE)
+    assert [float(ice) for ice, *_ in rows] == [brake_lock.ICE, 0.08, 0.04, 0.0]
+    for ice, *speeds in rows:
+        assert speeds == [f'{on_ice(case, float(ice)).car["speed"][-1]:.2f}'
+                          for case in (OPEN, BRAKE, NO_PRELOAD, PLATES, ELS)], ice
 
 
 def test_the_limited_slip_beats_the_brake_lock_and_spends_no_brake():
-    free, braked, run = (brake_lock.run(case, 3.0, direct=True) for case in (OPEN, BRAKE, ELS))
+    free, braked, run = (on_ice(case, seconds=3.0) for case in (OPEN, BRAKE, ELS))
     assert run.car['speed'][-1] > 1.5 * braked.car['speed'][-1] > 15 * free.car['speed'][-1]
     assert run.record.slip.max() < 6.5 and run.record.slip.min() > -0.1   # rad/s
     assert not run.car['left_brake'].any() and not run.car['right_brake'].any()
@@ -70,29 +110,28 @@ def test_the_limited_slip_beats_the_brake_lock_and_spends_no_brake():
 
 
 def test_the_axle_of_the_limited_slip_is_open_without_its_controller():
-    run = brake_lock.run(replace(ELS, controller=None), 3.0, direct=True)
-    free = brake_lock.run(OPEN, 3.0, direct=True)
+    run, free = (on_ice(case, seconds=3.0) for case in (replace(ELS, controller=None), OPEN))
     assert run.car['speed'][-1] == pytest.approx(free.car['speed'][-1], abs=0.03)
     assert run.record.slip[-1] == pytest.approx(free.record.slip[-1], rel=0.01)
     assert run.heat['clutches'] == 0.0
 
 
 def test_the_limited_slip_helps_either_wheel_alike_and_does_nothing_on_an_even_road():
-    ice, asphalt = brake_lock.CarParameters().grip
-    left, right, even = (of_axle(ELS, 1.5, grip=grip).car['speed'][-1] for grip in (
+    ice, asphalt = brake_lock.ICE, brake_lock.ASPHALT
+    left, right, even = (on_ice(ELS, grip, 1.5, other) for grip, other in (
         (ice, asphalt), (asphalt, ice), (asphalt, asphalt)))
-    assert left == pytest.approx(right, rel=1e-3)
-    assert even > left
-    run = of_axle(ELS, 1.5, grip=(asphalt, asphalt))
-    assert not any(force.any() for force in run.record.clutch_force.values())
+    assert left.car['speed'][-1] == pytest.approx(right.car['speed'][-1], rel=1e-3)
+    assert even.car['speed'][-1] > left.car['speed'][-1]
+    assert not any(force.any() for force in even.record.clutch_force.values())
 
 
-def test_the_heat_of_the_clutches_is_that_of_the_books():
-    books = DirectDifferential(ELS.variant, brake_lock.RATE)
-    books.simulation = AuditedSimulation(ELS.variant, 1.0 / brake_lock.RATE,
-                                         parameters=brake_lock.parameters_of(ELS))
-    law, car = brake_lock.law_of(books, ELS)
-    run = brake_lock.as_run(ELS, books.run(law, 1.5), car)
+@pytest.mark.parametrize('case', [PLATES, ELS], ids=['plates', 'els'])
+def test_the_heat_of_the_clutches_is_that_of_the_books(case):
+    books = DirectDifferential(brake_lock.VARIANT, brake_lock.RATE)
+    books.simulation = AuditedSimulation(brake_lock.VARIANT, 1.0 / brake_lock.RATE,
+                                         parameters=brake_lock.parameters_of(case))
+    law, car = brake_lock.law_of(books, case)
+    run = brake_lock.as_run(case, books.run(law, 1.5), car)
     assert run.heat['clutches'] == pytest.approx(
         sum(books.simulation.total.clutches), rel=2e-3)
 
@@ -110,23 +149,14 @@ def test_a_clutch_whose_slip_nobody_knows_is_open(slip):
 
 
 def test_the_page_of_the_example_says_what_the_command_says():
-    lines = brake_lock.report(
-        [brake_lock.run(case, 5.0, direct=True) for case in brake_lock.CASES])
-    page = (ROOT / 'doc' / 'example.md').read_text()
+    lines = brake_lock.report([on_ice(case) for case in brake_lock.CASES])
     for case, line in zip(brake_lock.CASES, lines[2:6]):
         name, car, slip, _, tyre, _, brakes, clutches = line.split()
         assert name == case.name
-        assert f'| {case.title} | {car} | {slip} | {tyre} | {brakes} | {clutches} |' in page
+        assert f'| {case.title} | {car} | {slip} | {tyre} | {brakes} | {clutches} |' in EXAMPLE
     # what the text says of the force and of the share of the brake lock
     force, share = lines[5].split()[5], float(lines[5].split()[1]) / float(lines[3].split()[1])
-    assert f'up to {force} kN' in page and f'{share:.1f} times' in page
-
-
-def test_the_asymmetric_axle_locks_better_towards_its_stronger_side():
-    def final_speed(grip):
-        return of_axle(LSD, 2.0, grip=grip).car['speed'][-1]
-    ice, asphalt = brake_lock.CarParameters().grip
-    assert final_speed((ice, asphalt)) > 1.2 * final_speed((asphalt, ice))
+    assert f'up to {force} kN' in EXAMPLE and f'{share:.1f} times' in EXAMPLE
 
 
 def test_a_demand_on_the_brake_is_limited_and_ends_with_the_slip():

@@ -114,16 +114,54 @@ def test_yaml_is_read_by_the_safe_loader_alone():
         assert loader == 'yaml.SafeLoader'
 
 
-def test_what_make_starts_stays_on_this_host():
-    """The demo, the fixtures and the tests set the range themselves or get it from make."""
-    assert re.search(r'^test:.*\n(\t.*\n)*\t.*ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST',
-                     (ROOT / 'Makefile').read_text(), re.MULTILINE)
-    for name in ('dm_ros/tools/demo.py', 'dm_ros/testing/lockstep.py', 'test/ros/conftest.py'):
-        text = (ROOT / name).read_text()
-        assert re.search(r"ROS_AUTOMATIC_DISCOVERY_RANGE'(\] = |, )'LOCALHOST'", text), name
-    # whoever else starts ROS in this repository says so too, but a node that its user starts
-    for path, tree in sources():
-        if ROOT / 'dm_ros' in path.parents or path.name == 'limited_slip.py':
-            continue
-        if 'rclpy.init' in calls(tree):
-            assert 'LOCALHOST' in path.read_text(), path
+RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+LOCAL = re.compile(rf'{RANGE}\W+LOCALHOST\b')   # in a recipe, and as code sets or passes it
+
+
+def recipe_lines():
+    """Return all lines of recipes in the Makefile, those that go on joined."""
+    return re.findall(r'^\t(.*)', (ROOT / 'Makefile').read_text().replace('\\\n', ' '),
+                      re.MULTILINE)
+
+
+def started_by_make():
+    """Yield (path, recipe line) of each script and each command of this project in a recipe."""
+    commands = {name: ROOT / f'{module.replace(".", "/")}.py' for name, module in re.findall(
+        r"'(\w+) = ([\w.]+):main'", (ROOT / 'setup.py').read_text())}
+    for line in recipe_lines():
+        for script in re.findall(r'\S+\.py\b', line):
+            yield ROOT / script, line
+        for name in re.findall(r'(?:bin|lib/dm_ros)/(\w+)', line):
+            if name in commands:
+                yield commands[name], line
+
+
+def uses_ros(path):
+    """Return whether a module imports rclpy or what of this package does."""
+    return re.search(r'^\s*(import rclpy|from (rclpy|dm_ros\.ros)\b)', path.read_text(),
+                     re.MULTILINE)
+
+
+def test_the_tests_that_make_starts_stay_on_this_host():
+    lines = [line for line in recipe_lines() if '-m pytest' in line]
+    assert len(lines) >= 3
+    for line in lines:
+        assert LOCAL.search(line) or '--ignore=test/ros' in line, line
+
+
+def test_what_make_starts_stays_on_this_host_and_a_node_of_a_user_is_as_visible_as_he_wants():
+    """What make starts without a range sets it, as the fixtures do; nothing else touches it."""
+    must = {path for path, line in started_by_make() if uses_ros(path) and not LOCAL.search(line)}
+    assert ROOT / 'dm_ros/tools/demo.py' in must
+    must.add(ROOT / 'dm_ros/testing/lockstep.py')
+    assert {path for path, _ in sources() if RANGE in path.read_text()} == must
+    for path in must:
+        assert LOCAL.search(path.read_text()), path
+
+
+def test_a_test_that_starts_ros_in_its_process_stays_on_this_host_without_make_too():
+    starting = [path for path in sorted((ROOT / 'test').rglob('*.py'))
+                if 'rclpy.init' in calls(ast.parse(path.read_text()))]
+    assert ROOT / 'test/ros/conftest.py' in starting
+    for path in starting:
+        assert LOCAL.search(path.read_text()), path

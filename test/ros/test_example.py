@@ -18,11 +18,11 @@ sys.path.insert(0, str(Path(__file__).parents[2] / 'examples'))
 
 import brake_lock
 
-from dm_ros.testing import DirectDifferential, lockstep, LockstepDifferential
+from dm_ros.testing import lockstep, LockstepDifferential
 
 ROOT = Path(__file__).parents[2]
-OPEN, BRAKE, LSD, ELS = brake_lock.CASES
-SECONDS = {OPEN: 1.25, BRAKE: 1.25, LSD: 1.0, ELS: 1.25}
+OPEN, BRAKE, PLATES, ELS = brake_lock.CASES
+SECONDS = {OPEN: 1.25, BRAKE: 1.25, PLATES: 1.0, ELS: 1.25}
 COMMAND = f'import sys; sys.path.insert(0, {str(ROOT / "examples")!r})\n' + \
     'import brake_lock; sys.exit(brake_lock.main())'
 LIMITED_SLIP = COMMAND.replace('brake_lock', 'limited_slip')
@@ -37,9 +37,8 @@ def through_topics(case):
 def grip_lost(run):
     """Return when the slip of the left tyre passes the peak of its curve, s."""
     p = brake_lock.CarParameters()
-    _, left, *_ = run.record.velocity.values()
     speed = run.car['speed']
-    slip = (p.wheel_radius * left - speed) / (speed + p.creep_speed)
+    slip = (p.wheel_radius * run.record.velocity['left'] - speed) / (speed + p.creep_speed)
     peak = math.tan(math.pi / (2 * p.tyre_shape)) / p.tyre_stiffness
     return run.record.time[np.argmax(slip > peak)]
 
@@ -57,11 +56,11 @@ def test_the_lock_stops_the_slip_of_a_wheel_that_lost_its_grip():
     assert locked.car['speed'][-1] > 5 * free.car['speed'][-1]
 
 
-def test_the_self_locking_axle_pulls_better_than_the_open_one():
-    free, lsd = through_topics(OPEN), through_topics(LSD)
-    last = len(lsd.record) - 1
-    assert lsd.car['speed'][last] > 4 * free.car['speed'][last]
-    assert lsd.record.moment['rear_mesh'][last] > 1.3 * free.record.moment['right_mesh'][last]
+def test_the_plates_pull_better_than_the_open_axle():
+    free, plates = through_topics(OPEN), through_topics(PLATES)
+    last = len(plates.record) - 1
+    assert plates.car['speed'][last] > 6 * free.car['speed'][last]
+    assert plates.record.torque['right'][last] < 3.5 * free.record.torque['right'][last] < 0.0
 
 
 def test_the_limited_slip_holds_the_wheel_on_ice_without_a_brake():
@@ -90,7 +89,7 @@ def test_through_topics_and_direct_are_the_same_to_the_last_bit(case):
 def test_a_reset_of_all_repeats_the_run(monkeypatch, case):
     monkeypatch.setattr(lockstep, 'LAST_ANSWER', 60.0)   # a slow machine may need it
     with LockstepDifferential(
-            case.variant, brake_lock.RATE, brake_lock.parameters_of(case)) as vehicle:
+            brake_lock.VARIANT, brake_lock.RATE, brake_lock.parameters_of(case)) as vehicle:
         car = brake_lock.attach(vehicle, case)
         first = vehicle.run(0.5)
         vehicle.reset()
@@ -105,20 +104,19 @@ def test_a_reset_of_all_repeats_the_run(monkeypatch, case):
 
 
 def test_the_command_draws_the_picture(tmp_path):
-    with Forked(COMMAND, '--seconds', 0.1, '--out', tmp_path / 'out') as command:
+    with Forked(COMMAND, '--seconds', 0.1, '--ice', 0.05, '--out', tmp_path / 'out') as command:
         assert command.ended() == 0, command.errors
         lines = command.output.splitlines()
-    assert [line.split()[0] for line in lines[2:6]] == ['open', 'brake', 'lsd', 'els']
+    assert [line.split()[0] for line in lines[2:6]] == ['open', 'brake', 'plates', 'els']
     assert (tmp_path / 'out' / 'example.png').read_bytes().startswith(b'\x89PNG')
-    direct = DirectDifferential(LSD.variant, brake_lock.RATE,
-                                parameters=brake_lock.parameters_of(LSD))
-    direct.run(brake_lock.law_of(direct, LSD)[0], 0.1)
+    direct = brake_lock.run(PLATES, 0.1, direct=True, p=brake_lock.CarParameters(
+        grip=(0.05, brake_lock.ASPHALT)))
     direct.record.save_csv(tmp_path / 'direct.csv')
-    assert (tmp_path / 'out' / 'lsd.csv').read_bytes() == (tmp_path / 'direct.csv').read_bytes()
+    assert (tmp_path / 'out' / 'plates.csv').read_bytes() == (tmp_path / 'direct.csv').read_bytes()
 
 
 def test_the_limited_slip_runs_beside_a_node_in_real_time_and_its_end_opens_the_clutches(ros):
-    node = ros.differential(ELS.variant, rate=200.0, torque_timeout=0.5, **{
+    node = ros.differential(brake_lock.VARIANT, rate=200.0, torque_timeout=0.5, **{
         name.replace('.', '__'): value for name, value in brake_lock.parameters_of(ELS).items()})
     clutches = ros.listen(JointState, '/differential/clutches')
     torques = ros.publisher(JointState, '/differential/torques')
@@ -131,6 +129,6 @@ def test_the_limited_slip_runs_beside_a_node_in_real_time_and_its_end_opens_the_
     with Forked(LIMITED_SLIP, '--ros-args', '-p', 'limit:=500.0') as controller:
         ros.until(lambda: min(force_with_torque()) > 499.0)
         assert max(clutches[-1].effort) <= 500.0
-        assert controller.ended(signal.SIGINT) == 0
+        assert controller.ended(signal.SIGINT) == 0, controller.errors
         assert 'Traceback' not in controller.errors
     ros.until(lambda: max(force_with_torque()) < 1e-3)
