@@ -62,6 +62,11 @@ def test_the_policy_grants_what_the_node_uses_and_nothing_more(monkeypatch):
         rclpy.init(context=context, domain_id=domain)
         try:
             for options in ({'symmetric.clutch.left.friction_surfaces': 2}, {'variant': 'lsd_ode'},
+                            {f'port.{shaft}.kind': 'speed'
+                             for shaft in ('pinion', 'left', 'right')},
+                            {'variant': 'lsd_ode', **{
+                                f'port.{shaft}.kind': 'speed'
+                                for shaft in ('carrier', 'front', 'rear')}},
                             {'mode': 'lockstep'}, {'use_sim_time': True},
                             {'publish_clock': True}):
                 node = DifferentialNode(context=context, parameter_overrides=[

@@ -15,7 +15,7 @@ import pytest
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.files.torque_table import read_torque_file, TorqueTable
-from dm_ros.mechanism.variants import variant_named
+from dm_ros.mechanism.variants import SYMMETRIC, variant_named
 from dm_ros.tools.simulate import main
 
 GOOD = 'time,pinion,left,right\n0,10,-15,-16\n0.5,-10,15,16\n1,0,0,0\n'
@@ -156,8 +156,8 @@ def test_the_last_time_ends_the_run(end, ticks):
 def test_reads_what_spreadsheets_write(folder):
     (folder / 'x.csv').write_bytes(
         b'\xef\xbb\xbf"right", time,"left",pinion\r\n 3,0,2, 1e0\r\n\r\n6,"1",5,4\r\n,,,\r\n')
-    assert read_torque_file('x.csv', ('pinion', 'left', 'right')) == TorqueTable(
-        (0.0, 1.0), ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
+    assert read_torque_file('x.csv', SYMMETRIC.ports) == TorqueTable(
+        (0.0, 1.0), ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)), (0.0, 0.0, 0.0))
 
 
 FORCED = ('time,rear_clutch,carrier,front,rear\n0,0,300,-100,-150\n0.1,2000,300,-100,-150\n'

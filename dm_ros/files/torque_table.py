@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Torques and forces over time from a CSV file, and which tick gets which row."""
+"""Torques, speeds and forces over time from a CSV file, and which tick gets which row."""
 
 from bisect import bisect_right
 import csv
@@ -16,6 +16,7 @@ class TorqueTable(NamedTuple):
 
     times: tuple     # s
     torques: tuple   # of tuples: N m, in the order of the inputs, and N, in that of the clutches
+    idle: tuple      # likewise, what holds before the first time
 
     def held(self, dt):
         """Return the ``HeldTorques`` for ticks of the length ``dt``, s."""
@@ -26,9 +27,9 @@ class HeldTorques:
     """
     The torques of a table, held in ticks: tick n has those in force at its start, n dt.
 
-    Before the first time of the table they are zero. The last time ends the run: it has as
-    many ticks as come nearest to that time. Times that are multiples of ``dt`` up to rounding
-    start exactly with their tick.
+    Before the first time of the table they are zero, and a speed port is free. The last time ends
+    the run: it has as many ticks as come nearest to that time. Times that are multiples of ``dt``
+    up to rounding start exactly with their tick.
 
     :raises ValueError: when the run has no tick, or more than can be counted.
     """
@@ -38,7 +39,7 @@ class HeldTorques:
         if not 0.5 < end < 2**53:
             raise ValueError(f'time: ticks of {dt:g} s make no run to {table.times[-1]:g} s')
         self._starts = [0] + [math.ceil(time / dt - ON_TIME) for time in table.times]
-        self._torques = ((0.0,) * len(table.torques[0]), *table.torques)
+        self._torques = table.idle, *table.torques
         self._ticks = round(end)
 
     def __len__(self):
@@ -57,11 +58,12 @@ class HeldTorques:
         return self._torques[bisect_right(self._starts, tick) - 1]
 
 
-def read_torque_file(path, inputs, clutches=()):
+def read_torque_file(path, ports, clutches=()):
     """
     Return the ``TorqueTable`` of a CSV file.
 
-    :param inputs: names of the shafts; the header is ``time`` and these, in any order.
+    :param ports: the ``Port`` s of the shafts; the header is ``time`` and their names, in any
+        order, and a cell is in the unit of its port.
     :param clutches: names of columns that may be there too, forces of at least 0; where one of
         them is, they follow the torques in each row of the table, all of them, 0 for the others.
     :raises ValueError: one line that names file, line and column.
@@ -69,14 +71,15 @@ def read_torque_file(path, inputs, clutches=()):
     try:
         # utf-8-sig: spreadsheets begin the file with a byte order mark
         with open(path, newline='', encoding='utf-8-sig') as file:
-            return _table(path, csv.reader(file, strict=True), inputs, clutches)
+            return _table(path, csv.reader(file, strict=True), ports, clutches)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{path}: not a text file in UTF-8') from None
 
 
-def _table(path, reader, inputs, clutches):
+def _table(path, reader, ports, clutches):
+    inputs = [port.name for port in ports]
     try:
         rows = (row for row in reader if any(cell.strip() for cell in row))
         header = _header(next(rows, ()), inputs, clutches)
@@ -98,7 +101,8 @@ def _table(path, reader, inputs, clutches):
         if isinstance(error, UnicodeDecodeError):
             raise
         raise ValueError(f'{path}:{max(reader.line_num, 1)}: {error}') from None
-    return TorqueTable(tuple(times), tuple(torques))
+    idle = *(port.idle for port in ports), *(0.0 for _ in forces)
+    return TorqueTable(tuple(times), tuple(torques), idle)
 
 
 def _header(row, inputs, clutches):

@@ -9,8 +9,8 @@ With phi_j the twist of the elastic shaft on port j, and Omega_j the speed that 
     dphi_j/dt = Omega_j - omega_j,    T_j = c_j phi_j + d_j (Omega_j - omega_j)
 
 and T_j acts on the differential, whose equations under torques are those of a ``Law``. All
-together is integrated in z = (omega_0, slip, chi_1, ...), where chi_j = phi_j sqrt(c_j/I_j) with the
-inertia I_j of the shaft: a speed like the others, by which the matrices are balanced.
+together is integrated in z = (omega_0, slip, chi_1, ...), where chi_j = phi_j sqrt(c_j/I_j) with
+the inertia I_j of the shaft: a speed like the others, by which the matrices are balanced.
 
 The step is the one of ``adaptive`` in more dimensions: exact where all is linear, however stiff or
 light, since the exponential of the whole is taken. As more than two modes may turn round within a

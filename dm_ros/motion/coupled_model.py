@@ -32,9 +32,9 @@ class CoupledModel:
     """
     A differential with half-shafts, under either law; see ``models`` for what a model does.
 
-    x is (omega_0, omega_1 - omega_2, twist of each half-shaft in rad). What comes in on a port with
-    a half-shaft is the speed outside, rad/s, or None where nothing holds it: it is free, and its
-    twist zero.
+    x is (omega_0, omega_1 - omega_2, twist of each half-shaft in rad). What comes in on a port
+    with a half-shaft is the speed outside, rad/s, or None where nothing holds it: it is free, and
+    its twist zero.
     """
 
     def __init__(self, formulation, mechanism, loss_law, parameters, h, ports):

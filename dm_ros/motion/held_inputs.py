@@ -17,9 +17,9 @@ class HeldInputs:
     """
     The last demand for each port and when it came, counted in ticks.
 
-    A demand is taken whole or not at all. A port without one in force has what it has when idle:
-    no torque, no force, and no speed, which is None. Ages are counted in simulated time, so a paused
-    mechanism does not lose its inputs.
+    A demand is taken whole or not at all. A port without one in force has what it has when
+    idle: no torque, no force, and no speed, which is None. Ages are counted in simulated time, so
+    a paused mechanism does not lose its inputs.
     """
 
     def __init__(self, ports, limits, timeout):
@@ -82,7 +82,8 @@ class HeldInputs:
     def _of_kinds(self, names, efforts, velocities):
         """Return one value for each name, the one that its port takes."""
         kinds = [name in self._speeds for name in names]
-        for what, values, needed in (('efforts', efforts, False), ('velocities', velocities, True)):
+        for what, values, needed in (('efforts', efforts, False),
+                                     ('velocities', velocities, True)):
             if len(values) != len(names) and (len(values) or needed in kinds):
                 raise ValueError(f'{len(names)} names but {len(values)} {what}')
         values = []

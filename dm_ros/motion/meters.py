@@ -314,8 +314,8 @@ class PassiveMeter:
         x, _, end, integral, _, _, path = step
         k = self._k
         if type(path) is Pattern:
-            return linear_book(path.second, path.moments, path.losses, self.form, k.g_F, self._h, x,
-                               end, integral, T)
+            return linear_book(path.second, path.moments, path.losses, self.form, k.g_F, self._h,
+                               x, end, integral, T)
         u, parts = path
         lost = numerical = None
         for part in parts:

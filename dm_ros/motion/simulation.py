@@ -11,8 +11,9 @@ import math
 from operator import add
 
 from dm_ros.mechanism.power_flow import DIRECT
-from dm_ros.mechanism.variants import equipped, PORT_TABLES, variant_named
+from dm_ros.mechanism.variants import equipped, variant_named
 from dm_ros.motion.actuators import actuators_of
+from dm_ros.motion.checks import checked, checked_ports, numbers_for, refuse
 from dm_ros.motion.coupled_model import model_with
 from dm_ros.motion.models import LOSS_LAWS, PASSIVE
 from dm_ros.motion.state import Snapshot, State
@@ -35,8 +36,8 @@ class Simulation:
     :param substeps: solver steps in a tick.
     :param power_flow_deadband: W, see ``dm_ros.mechanism.power_flow``.
     :param initial_velocity: speeds of the two output shafts at the start, rad/s.
-    :param ports: ``{shaft: (stiffness, damping)}`` of the input shafts where an outside speed comes
-        in instead of a torque, by an elastic shaft, N m/rad and N m s/rad.
+    :param ports: ``{shaft: (stiffness, damping)}`` of the input shafts where an outside speed
+        comes in instead of a torque, by an elastic shaft, N m/rad and N m s/rad.
     :raises ValueError: names what is wrong, its value and what is allowed.
     """
 
@@ -49,7 +50,7 @@ class Simulation:
         self.loss_law = loss_law
         parameters = self._table({} if parameters is None else parameters)
         self.mechanism = self._variant.mechanism
-        ports = self._checked_ports(ports)
+        ports = checked_ports(ports, self.inputs)
         self.mechanism = equipped(self.mechanism, parameters, ports)
         self.dt = checked('dt', dt, lambda v: v > 0.0, 'a positive number of seconds')
         self.power_flow_deadband = power_flow_deadband
@@ -202,26 +203,11 @@ class Simulation:
                              'any while it runs; friction_surfaces must be set at the start')
         substeps = checked('substeps', self._substeps if substeps is None else substeps,
                            lambda v: v >= 1 and v == int(v), 'a positive integer')
-        ports = self.ports if ports is None else self._checked_ports(ports)
+        ports = self.ports if ports is None else checked_ports(ports, self.inputs)
         if set(ports) != set(self.mechanism.half_shafts):
             raise ValueError('ports: which shafts take a speed cannot change while it runs')
         return (model_with(ports, self._variant.formulation, self.mechanism, self.loss_law,
                            parameters, self.dt / substeps), int(substeps))
-
-    def _checked_ports(self, ports):
-        """Return ``{shaft: (stiffness, damping)}`` as floats."""
-        result = {}
-        for shaft, pair in dict(ports).items():
-            if shaft not in self.inputs:
-                raise ValueError(f'ports: {shaft!r} is not one of {", ".join(self.inputs)}')
-            try:
-                stiffness, damping = pair
-            except (TypeError, ValueError):
-                raise ValueError(f'ports: {pair!r} of {shaft} is no stiffness and damping'
-                                 ) from None
-            table = PORT_TABLES[shaft](stiffness=stiffness, damping=damping)
-            result[shaft] = table.stiffness, table.damping
-        return result
 
     def _table(self, parameters):
         """Return a table of parameters, or those in force with a mapping of changes."""
@@ -364,35 +350,3 @@ class Simulation:
         refuse('clutch_forces', A, ports)
         return tuple([actuator.follow(force, command) for actuator, force, command
                       in zip(self._actuators, self._force, A)])
-
-
-def numbers_for(what, values, ports):
-    """Return values as floats, as many as there are ports; raise ValueError that names them."""
-    try:
-        numbers = tuple(map(float, values))
-        fits = len(numbers) == len(ports)
-    except (TypeError, ValueError, OverflowError):
-        fits = False
-    if not fits:
-        raise ValueError(f'{what}: {values!r} must be {len(ports)} numbers, '
-                         f'for {", ".join(port.name for port in ports)}')
-    return numbers
-
-
-def refuse(what, values, ports):
-    """Raise ValueError where a port does not take its value."""
-    for port, value in zip(ports, values):
-        if refusal := port.refusal(value):
-            raise ValueError(f'{what}: {refusal}')
-
-
-def checked(name, value, fits, allowed):
-    """Return the value as a finite float that fits; raise ValueError that names it."""
-    try:
-        number = float(value)
-        good = not isinstance(value, (bool, str)) and math.isfinite(number) and fits(number)
-    except (TypeError, ValueError, OverflowError):
-        good = False
-    if not good:
-        raise ValueError(f'{name}: {value!r} is not allowed, it must be {allowed}')
-    return number

@@ -128,6 +128,8 @@ class Diagnostics:
             'lost by drag [J]': f'{total.viscous:.6g}',
             'lost in gears and bearings [J]': f'{sum(total.gears) + sum(total.bearings):.6g}',
             'lost in clutches [J]': f'{sum(total.clutches):.6g}',
+            **({'lost in half-shafts [J]': f'{sum(total.half_shafts):.6g}'}
+               if total.half_shafts else {}),
             'taken by the error of the step [J]': f'{total.numerical:.3g}',
             'rated efficiency': f'{rated_efficiency(simulation.parameters):.6g}',
             'measured efficiency': 'none' if efficiency is None else f'{efficiency:.6g}',

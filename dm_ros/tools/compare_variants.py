@@ -80,7 +80,7 @@ def loads(arguments):
     if arguments.mechanism is None:
         raise ValueError('--torques needs --mechanism, as its columns are the shafts of one')
     mechanism = MECHANISMS[arguments.mechanism]
-    table = read_torque_file(arguments.torques, mechanism.inputs)
+    table = read_torque_file(arguments.torques, mechanism.ports)
     whole = table.times[-1]
     used = min(whole, seconds or TABLE_SECONDS)
     part = '' if used == whole else f', the first {used:g} of {whole:g} s'

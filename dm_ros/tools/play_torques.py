@@ -4,6 +4,7 @@
 """Publish torques to a differential node: a built-in load, or a CSV file."""
 
 import argparse
+import math
 import sys
 import time
 
@@ -18,15 +19,23 @@ from sensor_msgs.msg import JointState
 from dm_ros.ending import ignore_signals, run_command
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.torque_table import read_torque_file
-from dm_ros.mechanism.variants import MECHANISMS, variant_named, VARIANTS, WITH_CLUTCHES
+from dm_ros.mechanism.variants import (
+    equipped,
+    MECHANISMS,
+    variant_named,
+    VARIANTS,
+    WITH_CLUTCHES,
+)
+from dm_ros.settings import port_parameters, speed_ports
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
 CSV is a file as `simulate` reads it: a header "time,<shaft>,..." with every input shaft, and a
 row's torques hold until the time of the next row, those of the last row beyond it. Forces on
-clutches, in columns <clutch>_clutch, are played where CSV has any. Without --duration the last
-time ends the playing. All goes to the topic <node>/torques, in one message. At the end, and on
-Ctrl-C or SIGTERM as well, zeros are published so that no load stays behind.
+clutches, in columns <clutch>_clutch, are played where CSV has any. Where FILE has a speed port
+(port.<shaft>.kind: speed), the column of its shaft is the speed outside in rad/s. Without
+--duration the last time ends the playing. All goes to the topic <node>/torques, in one message. At
+the end, and on Ctrl-C or SIGTERM as well, zeros are published so that no load stays behind.
 """
 
 
@@ -40,7 +49,8 @@ def parser():
                         'the built-in load; default: %(default)s')
     family.add_argument('--profile', choices=MECHANISMS, help='the same by the mechanism alone')
     family.add_argument('--params', metavar='FILE',
-                        help='the same by the variant in the ROS 2 parameter file of the node')
+                        help='the same by the variant in the ROS 2 parameter file of the node, '
+                        'and which ports take a speed')
     result.add_argument('--torques', metavar='CSV', help='play this file, not the built-in load')
     result.add_argument('--rate', type=_positive, default=100.0, metavar='HZ',
                         help='messages in a second; default: 100')
@@ -68,14 +78,14 @@ def _positive(text):
 
 
 class Player:
-    """Publishes torques, and forces on clutches, to a node's topic ``torques``."""
+    """Publishes torques, outside speeds, and forces on clutches, to a node's topic ``torques``."""
 
-    def __init__(self, node, target, names):
-        self._node = node
+    def __init__(self, node, target, ports):
+        self._node, self._ports = node, ports
         reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
         topic = f'{target.rstrip("/")}/torques'
         self._publisher = node.create_publisher(JointState, topic, reliable)
-        self._message = JointState(name=list(names), effort=[0.0] * len(names))
+        self._message = JointState(name=[port.name for port in ports])
 
     def wait(self, seconds):
         """Wait for a subscriber, at most so long, and tell how it went."""
@@ -90,11 +100,16 @@ class Player:
             time.sleep(0.02)
         log.info(f'playing to {topic}')
 
-    def publish(self, torques):
-        """Publish one set of torques, N m, and forces, N, in the order of the names."""
+    def publish(self, values):
+        """Publish one value for each port, in its unit; None for a speed that is none."""
         self._message.header.stamp = self._node.get_clock().now().to_msg()
-        for index, torque in enumerate(torques):
-            self._message.effort[index] = float(torque)
+        is_speed = [port.kind == 'speed' for port in self._ports]
+        numbers = [math.nan if value is None else float(value) for value in values]
+        self._message.effort = [math.nan if speed else number
+                                for speed, number in zip(is_speed, numbers, strict=True)]
+        if any(is_speed):
+            self._message.velocity = [number if speed else math.nan
+                                      for speed, number in zip(is_speed, numbers)]
         self._publisher.publish(self._message)
 
     def play(self, torques_at, rate, count=None):
@@ -114,33 +129,37 @@ class Player:
                 time.sleep(max(0.0, start + n / rate - time.monotonic()))
 
     def unload(self):
-        """Publish zero torques and wait until they have arrived."""
-        self.publish([0.0] * len(self._message.name))
+        """Publish what an idle port has and wait until it has arrived."""
+        self.publish([port.idle for port in self._ports])
         self._publisher.wait_for_all_acked(Duration(seconds=1))
 
 
 def load(arguments):
     """
-    Return what to play: names, a function of n, the number of messages or None.
+    Return what to play: ports, a function of n, the number of messages or None.
 
-    :raises ValueError: for a CSV that is not as it should be.
+    :raises ValueError: for a CSV that is not as it should be, or none where one is needed.
     """
     rate, count = arguments.rate, None
     values = read_parameter_file(arguments.params) if arguments.params else {}
     mechanism = (MECHANISMS[arguments.profile] if arguments.profile
                  else variant_named(values.get('variant', arguments.variant)).mechanism)
-    names, clutches = mechanism.inputs, WITH_CLUTCHES[mechanism.name].clutch_moments
+    speeds = speed_ports(port_parameters(mechanism.inputs, values))
+    mechanism = equipped(WITH_CLUTCHES[mechanism.name], mechanism.parameters(), speeds)
+    ports = mechanism.ports
     if arguments.torques:
-        held = read_torque_file(arguments.torques, names, clutches).held(1 / rate)
+        held = read_torque_file(arguments.torques, ports, mechanism.clutch_moments).held(1 / rate)
         torques_at, count = held.at, len(held)
-        if len(torques_at(0)) > len(names):
-            names += clutches
+        if len(torques_at(0)) > len(ports):
+            ports += mechanism.actuators
+    elif speeds:
+        raise ValueError(f'--torques: it is needed where speed comes in, on {", ".join(speeds)}')
     else:
         def torques_at(n):
             return mechanism.load(n / rate)
     if arguments.duration:
         count = max(1, round(arguments.duration * rate))
-    return names, torques_at, count
+    return ports, torques_at, count
 
 
 def run(args):
@@ -148,10 +167,10 @@ def run(args):
     player = None
     try:
         arguments = parser().parse_args(remove_ros_args(args)[1:])
-        names, torques_at, count = load(arguments)
+        ports, torques_at, count = load(arguments)
         # rclpy's own handlers would shut down before the zero torques are out
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        player = Player(rclpy.create_node('play_torques'), arguments.node, names)
+        player = Player(rclpy.create_node('play_torques'), arguments.node, ports)
         player.wait(arguments.wait)
         player.play(torques_at, arguments.rate, count)
     finally:

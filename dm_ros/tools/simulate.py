@@ -32,14 +32,15 @@ IN.csv has a header "time,<shaft>,..." with every input shaft of the variant, in
 symmetric with friction surfaces: left_clutch, right_clutch). A row's torques and forces hold until
 the time of the next row; before the first row they are zero; the time of the last row ends the
 run, which begins at time 0. Each tick takes what is in force at its start; a time less than 1/1000
-of a tick after that start counts as on it.
+of a tick after that start counts as on it. The column of a shaft with a speed port of FILE
+(port.<shaft>.kind: speed) is the speed outside in rad/s.
 
 OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), torque.<input>
 (N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse), clutch_force.<clutch> (N): a row
 for the start, then one for the end of each tick. Without --out and --plot it goes to stdout.
 
 Of FILE, a ROS 2 parameter file, these count: variant, the parameters of the mechanism, loss_law,
-rate, substeps, power_flow_deadband and initial_velocity.
+rate, substeps, power_flow_deadband, initial_velocity and ports.
 """
 
 
@@ -92,8 +93,8 @@ def run(arguments):
     if variant is None:
         raise ValueError('--variant: it is needed where no FILE has the parameter variant')
     simulation = make_simulation(variant, values, arguments.dt)
-    table = read_torque_file(arguments.torques, simulation.inputs,
-                             simulation.mechanism.clutch_moments)
+    mechanism = simulation.mechanism
+    table = read_torque_file(arguments.torques, mechanism.ports, mechanism.clutch_moments)
     try:
         torques = table.held(simulation.dt)
     except ValueError as error:
