@@ -132,24 +132,26 @@ def test_the_tick_length_of_the_command_line_counts_more_than_that_of_the_file()
 def test_rows_on_multiples_of_the_tick_start_with_their_tick(dt, digits):
     """Also where the quotient, as 0.3/0.1, misses the integer, or a time has six decimals."""
     times = [float(f'{n * dt:.{digits}f}') for n in range(3000)]
-    held = TorqueTable(tuple(times), tuple((n, 0, 0) for n in range(3000))).held(dt)
+    held = TorqueTable(tuple(times), tuple((n, 0, 0) for n in range(3000)),
+                       (0.0, 0.0, 0.0)).held(dt)
     assert [torques[0] for torques in held] == list(range(2999))
     assert [held.at(n)[0] for n in range(3005)] == [*range(3000), *[2999] * 5]
 
 
 def test_a_row_between_ticks_waits_for_the_next_tick():
-    held = TorqueTable((0.0, 0.25, 0.31, 0.34, 0.6), tuple((n,) for n in range(5))).held(0.1)
+    times, torques = (0.0, 0.25, 0.31, 0.34, 0.6), tuple((n,) for n in range(5))
+    held = TorqueTable(times, torques, (0.0,)).held(0.1)
     assert [n for n, in held] == [0, 0, 0, 1, 3, 3]
 
 
 def test_before_the_first_row_the_torques_are_zero():
-    held = TorqueTable((0.2, 0.4), ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))).held(0.1)
+    held = TorqueTable((0.2, 0.4), ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)), (0.0, 0.0, 0.0)).held(0.1)
     assert list(held) == [(0.0, 0.0, 0.0)] * 2 + [(1.0, 2.0, 3.0)] * 2 and len(held) == 4
 
 
 @pytest.mark.parametrize('end, ticks', [(0.3, 3), (0.349, 3), (0.351, 4), (1e5, 1_000_000)])
 def test_the_last_time_ends_the_run(end, ticks):
-    held = TorqueTable((0.0, end), ((1.0,), (2.0,))).held(0.1)
+    held = TorqueTable((0.0, end), ((1.0,), (2.0,)), (0.0,)).held(0.1)
     assert len(held) == sum(1 for _ in held) == ticks
 
 

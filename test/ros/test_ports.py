@@ -81,15 +81,16 @@ def test_speeds_and_forces_come_in_one_message_and_csv_gives_the_same_bits(ros, 
                                  (carrier, NAN, front, force), (NAN, rear, NAN, NAN)))
     ros.until(lambda: len(joints) == len(rows))
     (tmp_path / 'speed.yaml').write_text('/**: {ros__parameters: {port.rear.kind: speed}}')
-    (tmp_path / 'in.csv').write_text('time,carrier,rear,front,rear_clutch\n' + ''.join(
-        f'{n / 200!r},{",".join(map(repr, row))}\n' for n, row in enumerate(rows)) + '0.2,0,0,0,0\n')
+    lines = [','.join(map(repr, (n / 200, *row))) for n, row in enumerate(rows)]
+    (tmp_path / 'in.csv').write_text('\n'.join(
+        ['time,carrier,rear,front,rear_clutch', *lines, '0.2,0,0,0,0\n']))
     assert simulate(['--variant', 'lsd_ode', '--params', str(tmp_path / 'speed.yaml'),
                      '--torques', str(tmp_path / 'in.csv'),
                      '--out', str(tmp_path / 'out.csv')]) == 0
     columns = np.genfromtxt(tmp_path / 'out.csv', delimiter=',', names=True, deletechars='')
     for column, shaft in (('velocity.rear', 2), ('position.front', 1)):
-        kind = column.partition('.')[0]
-        assert [getattr(message, kind)[shaft] for message in joints] == columns[column][1:].tolist()
+        heard = [getattr(message, column.partition('.')[0])[shaft] for message in joints]
+        assert heard == columns[column][1:].tolist()
     assert [message.effort[2] for message in joints] == columns['torque.rear'][1:].tolist()
 
 
