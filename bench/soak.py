@@ -20,6 +20,7 @@ import time
 
 import numpy as np
 
+from dm_ros.mechanism.variants import variant_named
 from dm_ros.ros.domain import own_domain
 from dm_ros.ros.recorder import Recorder
 from dm_ros.tools.demo import process, wait
@@ -47,7 +48,7 @@ def soak(arguments, folder):
     rows = []
     parameters = ['--ros-args', '-p', f'variant:={arguments.variant}', '-p',
                   f'rate:={arguments.rate!r}']
-    with Recorder('/differential', arguments.variant) as recorder, \
+    with Recorder('/differential', variant_named(arguments.variant).mechanism) as recorder, \
             process('ros.command', *parameters) as node, \
             process('tools.play_torques', '--variant', arguments.variant) as player:
         wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft', node, player)

@@ -14,6 +14,7 @@ import yaml
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
+from dm_ros.mechanism.ports import port_table
 from dm_ros.settings import NodeParameters
 
 ROOT = Path(__file__).parents[1]
@@ -28,7 +29,8 @@ def test_the_readme_is_short():
 def parameter_table():
     """Return the lines of the table of parameters."""
     lines = ['| name | default | unit | allowed | |', '|---|---|---|---|---|']
-    for table in (NodeParameters(), SymmetricParameters(), SelfLockingParameters()):
+    for table in (NodeParameters(), port_table('<input shaft>')(), SymmetricParameters(),
+                  SelfLockingParameters()):
         for symbol, (name, entry) in table.rows().items():
             value = getattr(table, symbol)
             default = f'{value:.10g}' if entry.kind is float else f'{value}'

@@ -11,7 +11,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Int8
 
 from dm_ros.files.record import Record
-from dm_ros.mechanism.variants import variant_named
 from dm_ros.ros.messages import never_called, Polled
 from dm_ros.ros.privates import poll
 
@@ -26,9 +25,9 @@ class Recorder:
     and before the joint states of the next tick.
     """
 
-    def __init__(self, node, variant):
-        """:param node: full name of the node to record; variant: which it runs."""
-        self._mechanism = variant_named(variant).mechanism
+    def __init__(self, node, mechanism):
+        """:param node: full name of the node to record; mechanism: the ``Mechanism`` it runs."""
+        self._mechanism = mechanism
         self._context = rclpy.Context()
         rclpy.init(context=self._context,
                    signal_handler_options=rclpy.SignalHandlerOptions.NO)

@@ -18,10 +18,12 @@ import sys
 import time
 
 from dm_ros.ending import run_command
+from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.mechanism.variants import VARIANTS
-from dm_ros.motion.models import LOSS_LAWS, PASSIVE
+from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.ros.domain import own_domain
 from dm_ros.ros.recorder import Recorder
+from dm_ros.settings import make_simulation, NodeParameters
 from dm_ros.tools.progress import progress
 
 PATIENCE = 30.0   # s, until the processes have found each other
@@ -31,14 +33,17 @@ def parser():
     """Return the parser of the command line."""
     result = argparse.ArgumentParser('demo', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    result.add_argument('--variant', choices=VARIANTS, default='symmetric_ode',
-                        help='the mechanism and its formulation')
-    result.add_argument('--loss-law', choices=LOSS_LAWS, default=PASSIVE,
-                        help=f'what gears and bearings lose, default {PASSIVE}')
+    node = NodeParameters()
+    result.add_argument('--params', metavar='FILE',
+                        help='a ROS 2 parameter file; what is given besides counts instead of it')
+    result.add_argument('--variant', choices=VARIANTS,
+                        help=f'the mechanism and its formulation, default {node.variant}')
+    result.add_argument('--loss-law', choices=LOSS_LAWS,
+                        help=f'what gears and bearings lose, default {node.loss_law}')
     result.add_argument('--duration', type=positive, default=10.0, metavar='S',
                         help='length of the recording, default 10')
-    result.add_argument('--rate', type=positive, default=200.0, metavar='HZ',
-                        help='ticks in a second, default 200')
+    result.add_argument('--rate', type=positive, metavar='HZ',
+                        help=f'ticks in a second, default {node.rate:g}')
     result.add_argument('--out', type=Path, default=Path('run'), metavar='FOLDER',
                         help='where the CSV and the PNG go, default run')
     return result
@@ -87,22 +92,38 @@ def next_report(recorder):
     return condition
 
 
-def run_processes(arguments):
+def simulation_of(arguments):
+    """Return the simulation that the node will run."""
+    values = read_parameter_file(arguments.params) if arguments.params else {}
+    given = {'variant': arguments.variant, 'loss_law': arguments.loss_law, 'rate': arguments.rate}
+    values |= {name: value for name, value in given.items() if value is not None}
+    simulation = make_simulation(values.get('variant', NodeParameters().variant), values)
+    if speeds := simulation.mechanism.half_shafts:
+        raise ValueError(f'{arguments.params}: the load is torques, but {", ".join(speeds)} '
+                         'would take a speed')
+    return simulation
+
+
+def run_processes(arguments, simulation):
     """Return the recorder after a run of the two processes."""
     namespace = f'/demo_{os.getpid()}'   # even in a shared domain nobody else is heard
-    parameters = ['--ros-args', '-r', f'__ns:={namespace}', '-p', f'variant:={arguments.variant}',
-                  '-p', f'rate:={arguments.rate!r}', '-p', f'loss_law:={arguments.loss_law}']
-    with Recorder(f'{namespace}/differential', arguments.variant) as recorder:
+    parameters = ['--ros-args', '-r', f'__ns:={namespace}']
+    if arguments.params:
+        parameters += ['--params-file', arguments.params]
+    for name, value in (('variant', simulation.variant), ('loss_law', simulation.loss_law),
+                        ('rate', 1 / simulation.dt)):
+        parameters += ['-p', f'{name}:={value}']
+    with Recorder(f'{namespace}/differential', simulation.mechanism) as recorder:
         with process('ros.command', *parameters) as node:
             wait(recorder.poll, 'state of the differential', node)
-            with process('tools.play_torques', '--variant', arguments.variant,
+            with process('tools.play_torques', '--variant', simulation.variant,
                          '--node', f'{namespace}/differential') as player:
                 wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft',
                      node, player)
                 wait(next_report(recorder), 'report of the differential', node, player)
                 recorder.clear()
                 end = time.monotonic() + arguments.duration
-                with progress(total=round(arguments.duration * arguments.rate)) as bar:
+                with progress(total=round(arguments.duration / simulation.dt)) as bar:
                     while (left := end - time.monotonic()) > 0.0:
                         time.sleep(min(0.02, left))
                         bar.update(recorder.poll())
@@ -137,18 +158,19 @@ def report(record, missed, rate):
 def run(arguments):
     """Do what the command line says; raise OSError, RuntimeError or ValueError where it fails."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    simulation = simulation_of(arguments)
     arguments.out.mkdir(parents=True, exist_ok=True)
     with own_domain() as domain:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
-        recorder = run_processes(arguments)
+        recorder = run_processes(arguments, simulation)
+    variant, rate = simulation.variant, 1 / simulation.dt
     record = recorder.record(
-        arguments.duration,
-        f'{arguments.variant} at {arguments.rate:g} Hz, {arguments.loss_law} law of losses')
-    csv = arguments.out / f'{arguments.variant}.csv'
-    png = arguments.out / f'{arguments.variant}.png'
+        arguments.duration, f'{variant} at {rate:g} Hz, {simulation.loss_law} law of losses')
+    csv = arguments.out / f'{variant}.csv'
+    png = arguments.out / f'{variant}.png'
     record.save_csv(csv)
     record.save_plot(png)
-    print('\n'.join(report(record, recorder.missed, arguments.rate)))
+    print('\n'.join(report(record, recorder.missed, rate)))
     print(f'\nwritten       {csv}\n              {png}')
 
 

@@ -383,7 +383,7 @@ def test_a_controller_that_closes_the_clutches_by_slip_is_the_library_to_the_las
 def test_what_is_recorded_over_topics_has_the_forces_of_each_tick(ros):
     node = ros.differential('lsd_ode', mode='lockstep', rate=100.0)
     simulation = Simulation('lsd_ode', 0.01)
-    with Recorder('/differential', 'lsd_ode') as recorder:
+    with Recorder('/differential', variant_named('lsd_ode').mechanism) as recorder:
         publisher = ros.publisher(JointState, TORQUES, depth=100)
         outputs = node.outputs
         ros.until(lambda: all(output.get_subscription_count() for output in (

@@ -5,6 +5,7 @@
 
 from contextlib import ExitStack
 import csv
+from pathlib import Path
 
 from processes import command, Forked
 import pytest
@@ -15,6 +16,7 @@ from dm_ros.motion.simulation import Simulation
 DEMO = command('tools.demo')
 VARIANTS = ('symmetric_dae', 'lsd_lagged')
 LAWS = {'symmetric_dae': 'passive', 'lsd_lagged': 'paper'}
+PRESETS = Path(__file__).parents[2] / 'config' / 'presets'
 
 
 @pytest.fixture(scope='module')
@@ -65,3 +67,21 @@ def test_a_bad_variant_or_an_unwritable_folder_ends_it_with_one_line(tmp_path):
         assert line.startswith('demo: ')
     with Forked(DEMO, '--out', tmp_path, '--variant', 'torsen') as demo:
         assert demo.ended() == 2
+
+
+def test_it_runs_with_the_parameters_of_a_file(tmp_path):
+    preset = PRESETS / 'plate_axle_2_way.yaml'
+    with Forked(DEMO, '--params', preset, '--rate', 100, '--duration', 1, '--out',
+                tmp_path) as demo:
+        assert demo.ended() == 0, demo.errors
+    with open(tmp_path / 'symmetric_ode.csv', newline='') as file:
+        rows = list(csv.DictReader(file))
+    assert any(float(row['moment.left_clutch']) for row in rows)
+
+
+def test_a_file_with_a_speed_port_is_refused_in_one_line(tmp_path):
+    (tmp_path / 'speed.yaml').write_text('/**: {ros__parameters: {port.left.kind: speed}}')
+    with Forked(DEMO, '--params', tmp_path / 'speed.yaml', '--out', tmp_path) as demo:
+        assert demo.ended() == 1
+        line, = demo.errors.strip().splitlines()
+    assert line.endswith('the load is torques, but left would take a speed')
