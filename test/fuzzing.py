@@ -12,6 +12,7 @@ A sequence is one life of a machine. After each of its steps the laws of ``Laws`
 
 from contextlib import contextmanager, ExitStack
 from copy import deepcopy
+from functools import cache
 import math
 import os
 import time
@@ -33,7 +34,7 @@ from properties import constraints
 
 from dm_ros import VARIANTS
 from dm_ros.energy import AuditedSimulation
-from dm_ros.mechanism.variants import MECHANISMS, variant_named
+from dm_ros.mechanism.variants import MECHANISMS, PORT_TABLES, variant_named
 from dm_ros.plant import Plant
 from dm_ros.settings import NodeParameters
 from dm_ros.tools.progress import progress
@@ -49,6 +50,7 @@ finite = st.floats(-1e6, 1e6) | st.sampled_from([0.0, -0.0, 30.0, -200.0, 1e5, -
 anything = finite | st.floats() | st.sampled_from([math.nan, math.inf, -math.inf, 1e308, -1e308])
 
 
+@cache
 def demands(mechanism):
     """Return demands as (names, values): good ones, and such that must be refused."""
     forces = [port.name for port in mechanism.actuators]
@@ -65,11 +67,10 @@ def demands(mechanism):
 
 def as_demanded(mechanism, names, values, sparse=True):
     """Return whether a demand is to be taken; sparse: whether NaN is no demand."""
-    forces = {port.name for port in mechanism.actuators}
-    return (len(names) == len(values) == len(set(names))
-            and set(names) <= forces | set(mechanism.inputs)
+    ports = {port.name: port for port in mechanism.ports + mechanism.actuators}
+    return (len(names) == len(values) == len(set(names)) and set(names) <= set(ports)
             and all(sparse if math.isnan(value) else
-                    math.isfinite(value) and not (name in forces and value < 0.0)
+                    math.isfinite(value) and ports[name].low <= value <= ports[name].high
                     for name, value in zip(names, values)))
 
 
@@ -107,8 +108,8 @@ def changes(table, wanted=lambda name: True):
     return st.lists(pair, min_size=1, max_size=3).map(dict)
 
 
-DEMANDS = {m.name: demands(m) for m in MECHANISMS.values()}
 TABLES = {m.parameters: changes(m.parameters) for m in MECHANISMS.values()}
+PORTS = {shaft: changes(table) for shaft, table in PORT_TABLES.items()}
 OWN = ('torque_limit', 'torque_timeout', 'power_flow_deadband', 'substeps')
 own_changes = changes(
     NodeParameters, lambda name: name in OWN or name.startswith('initial_velocity'))
@@ -141,9 +142,9 @@ class Laws:
             off = np.abs(terms.sum(axis=1))
             assert (off <= ROUNDING * size.max(axis=1) + SUBNORMAL).all(), (
                 off, velocity, position, offset)
-        if len(moment) == 4:   # friction opposes slip; the satellite turns with the rear
+        if len(moment) > 3:   # friction opposes slip; the satellite turns with the rear
             slip = -velocity[-1]
-            assert moment[2] * slip >= 0.0 >= moment[3] * slip, (moment, slip)
+            assert moment[-2] * slip >= 0.0 >= moment[-1] * slip, (moment, slip)
 
 
 class CoreMachine(RuleBasedStateMachine):
@@ -158,12 +159,17 @@ class CoreMachine(RuleBasedStateMachine):
         self.paused = False
 
     @initialize(variant=st.sampled_from(VARIANTS), rate=st.sampled_from([50.0, 200.0, 1000.0]),
-                start=st.tuples(finite, finite), audited=st.booleans())
-    def begin(self, variant, rate, start, audited):
-        outputs = variant_named(variant).mechanism.outputs
+                start=st.tuples(finite, finite), audited=st.booleans(), clutches=st.booleans(),
+                speeds=st.just(()) | st.just(()) | st.sets(st.integers(0, 2)))
+    def begin(self, variant, rate, start, audited, clutches, speeds):
+        mechanism = variant_named(variant).mechanism
+        surfaces = {'symmetric.clutch.right.friction_surfaces': 3} if clutches else {}
         self.plant = Plant({
             'variant': variant, 'rate': rate, 'energy_audit': audited,
-            **{f'initial_velocity.{shaft}': v for shaft, v in zip(outputs, start)}}, SILENT)
+            **mechanism.parameters.part_of(surfaces),
+            **{f'port.{mechanism.inputs[n]}.kind': 'speed' for n in speeds},
+            **{f'initial_velocity.{shaft}': v
+               for shaft, v in zip(mechanism.outputs, start)}}, SILENT)
         self.simulation, self.inputs = self.plant.simulation, self.plant.inputs
         self.laws = Laws(variant)
         self.last_stamp = self.ticks = 0
@@ -181,7 +187,7 @@ class CoreMachine(RuleBasedStateMachine):
     def demands(self, data, stamp, sparse):
         mechanism = self.simulation.mechanism
         limits = dict(zip(self.inputs.names, self.inputs.limits))
-        names, values = data.draw(DEMANDS[mechanism.name])
+        names, values = data.draw(demands(mechanism))
         stamp = stamp_of(stamp, self.last_stamp)
         good = as_demanded(mechanism, names, values, sparse) and (
             stamp == 0 or stamp > self.last_stamp)
@@ -211,9 +217,9 @@ class CoreMachine(RuleBasedStateMachine):
             held = self.inputs.in_force(self.ticks)
             timeout = self.inputs.timeout
             assert held == tuple(
-                0.0 if name not in self.demand or timeout
-                and self.demand[name][1] < self.ticks - timeout else self.demand[name][0]
-                for name in self.inputs.names)
+                port.idle if port.name not in self.demand or timeout
+                and self.demand[port.name][1] < self.ticks - timeout else
+                self.demand[port.name][0] for port in self.inputs.ports)
             before, refused = self.simulation.snapshot(), self.plant.out_of_range.count
             snapshot = self.plant.tick()
             if self.plant.out_of_range.count > refused:
@@ -223,7 +229,9 @@ class CoreMachine(RuleBasedStateMachine):
             self.ticks += 1
             self.count('ticks')
             shafts = len(snapshot.torque)
-            assert snapshot.torque == held[:shafts]
+            assert self.simulation.state.held == held[:shafts]
+            for port, torque, value in zip(self.inputs.ports, snapshot.torque, held):
+                assert torque == value or port.kind == 'speed' and math.isfinite(torque)
             for before_, force, command in zip(
                     before.clutch_force, snapshot.clutch_force, held[shafts:], strict=True):
                 # an actuator moves towards its command, or its limit
@@ -235,10 +243,14 @@ class CoreMachine(RuleBasedStateMachine):
         changed = data.draw(TABLES[type(self.simulation.parameters)])
         self.change_of(changed if substeps is None else {**changed, 'substeps': substeps})
 
+    @rule(data=st.data())
+    def change_of_a_port(self, data):
+        self.change_of(data.draw(PORTS[data.draw(st.sampled_from(self.simulation.inputs))]))
+
     @rule(changed=own_changes | changes(NodeParameters))
     def change_of(self, changed):
         before, snapshot = self.in_force(), self.simulation.snapshot()
-        parameters, substeps = self.simulation.parameters, self.simulation.substeps
+        parameters = self.simulation.parameters
         try:
             prepared = self.plant.prepared(changed)
         except ValueError as error:
@@ -254,14 +266,16 @@ class CoreMachine(RuleBasedStateMachine):
         assert self.simulation.substeps == self.plant.settings.substeps
         after = self.simulation.snapshot()
         assert after.position == snapshot.position
-        if (self.simulation.parameters, self.simulation.substeps) != (parameters, substeps):
+        if prepared.model:
             self.laws.parameters_changed(snapshot.position)
         np.testing.assert_allclose(after.velocity[1:3], snapshot.velocity[1:3], rtol=1e-12,
                                    atol=1e-12 * max(map(abs, snapshot.velocity[1:3]))
                                    + SUBNORMAL)
         # a demand that was clamped to an older limit stays what it is
         shafts = len(snapshot.torque)
-        assert self.inputs.limits[:shafts] == (self.plant.settings.torque_limit,) * shafts
+        assert self.inputs.limits[:shafts] == tuple(
+            self.plant.settings.torque_limit if port.kind == 'torque' else math.inf
+            for port in self.simulation.mechanism.ports)
         assert after.clutch_force == snapshot.clutch_force
 
     @rule()
@@ -345,7 +359,7 @@ class NodeMachine(RuleBasedStateMachine):
         from builtin_interfaces.msg import Time
         from sensor_msgs.msg import JointState
         mechanism = self.node.simulation.mechanism
-        names, values = data.draw(DEMANDS[mechanism.name])
+        names, values = data.draw(demands(mechanism))
         for _ in range(times):
             stamp_now = stamp_of(stamp, self.last_stamp)
             message = JointState(name=names, effort=values)
