@@ -334,8 +334,9 @@ def lost_powers(k, u, point):
         bearing_3 = k.bearing_3 * abs(sigma_0) * (
             k.l_3 * w_3 * w_3 + (P_w3 if P_w3 > 0.0 else 0.0) - (T_w3 if T_w3 < 0.0 else 0.0))
     X = k.l_0 * w - k.l_1 * k_1s + k.l_2 * k_2s - F_1 - F_2
-    bearing_0 = k.bearing_0 * abs(sigma_0) * b * (
-        X * w + h_N * N * w - (C * w if C * w < 0.0 else 0.0))
+    # the bracket is 0 at least, but for rounding
+    bearing_0 = k.bearing_0 * abs(sigma_0) * b * max(
+        0.0, X * w + h_N * N * w - (C * w if C * w < 0.0 else 0.0))
     return (k.l_0 * w * w + k.l_3 * w_3 * w_3 + k.l_1 * k_1s * k_1s + k.l_2 * k_2s * k_2s
             + k.l_s * k.k_2 * s * s,
             mesh_F, 2 * k.half_1 * abs(M_1) * sigma_1 * (w + k_1s),
