@@ -20,7 +20,14 @@ from dm_ros.settings import make_simulation, NodeParameters, port_parameters, sp
 
 
 class Condition:
-    """Something that should not be: counted, logged when it begins and when it has ended."""
+    """
+    Something that should not be: counted, logged when it begins and when it has ended.
+
+    It is ``active`` until a second without it. The log is slower to say that it is over, so that
+    one that comes and goes takes two lines, and not two in every second.
+    """
+
+    QUIET = 10   # s without it, after which the log says that it is over
 
     def __init__(self, what, log):
         """:param what: in words, such as ``ticks are missed``; log: has ``warning``, ``info``."""
@@ -29,7 +36,8 @@ class Condition:
         self.reason = ''
         self.active = False
         self._log = log
-        self._settled = 0
+        self._settled = self._before = self._quiet = 0
+        self._told = False   # in the log that it has begun, and not yet that it is over
 
     def __str__(self):
         return f'{self.what}: {self.reason}'
@@ -38,15 +46,20 @@ class Condition:
         """Count it, and log it if it begins now."""
         self.count += times
         self.reason = reason
-        if not self.active:
-            self.active = True
+        self.active = True
+        if not self._told:
+            self._told = True
             self._log.warning(str(self))
 
     def settle(self):
-        """Log its end if it did not happen since the last call; to be called at 1 Hz."""
-        if self.active and self.count == self._settled:
+        """End it if it did not happen since the last call; to be called at 1 Hz."""
+        self._quiet = self._quiet + 1 if self.count == self._settled else 0
+        if self._quiet:
             self.active = False
-            self._log.info(f'over: {self.what} ({self.count} in all)')
+        if self._told and self._quiet >= self.QUIET:
+            self._told = False
+            self._log.info(f'over: {self.what} ({self.count - self._before} times since it began)')
+            self._before = self.count
         self._settled = self.count
 
 

@@ -351,9 +351,30 @@ def test_a_condition_is_logged_once_when_it_begins_and_once_when_it_is_over(log)
         condition.settle()
     assert not condition.active
     begin = 'WARN demands are clamped: beyond 1 N m'
-    assert log.lines == [begin, 'INFO over: demands are clamped (7 in all)']
+    assert log.lines == [begin]
+    for _ in range(10):
+        condition.settle()
+    assert log.lines == [begin, 'INFO over: demands are clamped (7 times since it began)']
     condition.happened('beyond 1 N m')
     assert log.lines[2:] == [begin]
+
+
+def test_a_condition_that_comes_and_goes_is_one_line_in_ten_seconds_with_the_count_of_its_spell(
+        log):
+    condition = Condition('ticks are missed', log)
+    for second in range(300):   # comes and goes for two minutes, then twice more
+        if second % 3 == 0 and second < 120 or second in (200, 250):
+            condition.happened('2 since the last report', times=2)
+        condition.settle()
+        assert condition.active == (second % 3 == 0 and second < 120 or second in (200, 250))
+    assert log.lines == [
+        'WARN ticks are missed: 2 since the last report',
+        'INFO over: ticks are missed (80 times since it began)',
+        'WARN ticks are missed: 2 since the last report',
+        'INFO over: ticks are missed (2 times since it began)',
+        'WARN ticks are missed: 2 since the last report',
+        'INFO over: ticks are missed (2 times since it began)']
+    assert condition.count == 84
 
 
 def test_conditions_of_a_plant_begin_and_end_once(log):
@@ -366,17 +387,21 @@ def test_conditions_of_a_plant_begin_and_end_once(log):
             plant.tick()
         plant.notice()
         plant.settle()
+    for _ in range(8):
+        plant.notice()
+        plant.settle()
     assert log.lines == [
         'WARN messages are refused: test: the torque on left is nan',
         'WARN demands are clamped: test: beyond 100000 N m',
         'WARN demands are too old and count as zero: left',
-        'INFO over: messages are refused (3 in all)',
-        'INFO over: demands are clamped (3 in all)']
+        'INFO over: messages are refused (3 times since it began)',
+        'INFO over: demands are clamped (3 times since it began)']
     plant.reset()
-    for _ in range(2):
+    for _ in range(11):
         plant.notice()
         plant.settle()
-    assert log.lines[5:] == ['INFO over: demands are too old and count as zero (3 in all)']
+    assert log.lines[5:] == [
+        'INFO over: demands are too old and count as zero (11 times since it began)']
 
 
 # Gears and bearings that give energy back
@@ -414,13 +439,13 @@ def test_a_governed_cruise_under_the_law_of_the_paper_warns_until_power_runs_all
     assert plant.motoring.active and plant.motoring.count == 4
     assert float(plant.motoring.reason.split()[0]) == pytest.approx(given / 4, rel=0.05)
     plant.take(('pinion',), (80.0,), 'test')   # more than the losses
-    for _ in range(2):
-        for _ in range(1000):
+    for _ in range(11):
+        for _ in range(100):
             plant.tick()
         plant.notice()
         plant.settle()
     assert log.lines[1:] == ['INFO over: gears and bearings give energy back, as motors '
-                             '(4 in all)']
+                             '(4 times since it began)']
 
 
 @pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])
