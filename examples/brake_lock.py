@@ -29,10 +29,10 @@ from car import (
     Car,
     CarOnHalfShafts,
     CarParameters,
-    half_shafts,
     ICE,
     LimitedSlip,
     Moment,
+    speed_ports,
     with_engine,
     with_wheels_and_engine,
 )
@@ -98,7 +98,7 @@ def parameters_of(case, p=None, coupling=TORQUE):
 
 def ports_of(coupling, p=None):
     """Return the speed ports of the differential in the car."""
-    return half_shafts(VARIANT, p or CarParameters()) if coupling == SPEED else {}
+    return speed_ports(VARIANT, p or CarParameters()) if coupling == SPEED else {}
 
 
 def direct_differential(case, rate=RATE, p=None, coupling=TORQUE):

@@ -68,7 +68,7 @@ def _with_inertias(variant, attached):
             for shaft, inertia in attached(driven, wheels).items()}
 
 
-def half_shafts(variant, p):
+def speed_ports(variant, p):
     """Return the speed ports of the wheels, as ``Simulation`` takes them."""
     wheels = variant_named(variant).mechanism.inputs[1:]
     return dict.fromkeys(wheels, (p.half_shaft_stiffness, p.half_shaft_damping))
@@ -126,6 +126,7 @@ class Car:
         """
         time, forces = self._begin(brake_demands)
         left, right = self._torques(self.wheels, forces)
+        # the driver does not let it roll back
         self.speed = max(0.0, self.speed + self.dt * self._acceleration(forces))
         return self.engine_torque(time, self.pinion_speed), left, right
 
@@ -150,7 +151,7 @@ class Car:
                 for force, brake, wheel in zip(forces, self.brakes, wheels)]
 
     def _acceleration(self, forces):
-        """Return that of the car, m/s^2; the driver does not let it roll back."""
+        """Return that of the car, m/s^2."""
         p = self.p
         resistance = p.mass * GRAVITY * (p.grade + p.rolling_resistance)
         return (sum(forces) - resistance) / p.mass

@@ -45,7 +45,7 @@ def differences(run, reference, after=0.0):
 
 def relative(run, reference, after):
     """Return the greatest differences, % of the value at the same time, from a time on, s."""
-    return {name: 100.0 * (abs(one - other) / abs(other))[late].max()
+    return {name: 100.0 * (abs(one - other)[late] / abs(other)[late]).max()
             for name, one, other, late in _side_by_side(run, reference, after)}
 
 

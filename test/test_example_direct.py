@@ -225,11 +225,16 @@ def test_the_slip_of_the_plates_magnifies_whatever_differs():
     assert f'{100 * (more / heat - 1):.0f} % more heat' in EXAMPLE
 
 
+@cache
+def with_each_coupling(rate):
+    """Return the ``Run`` of the brake lock at a rate, Hz, by torque ports and by speed ports."""
+    return [brake_lock.run(BRAKE, 1.5, True, None, coupling, rate) for coupling in brake_lock.CARS]
+
+
 @pytest.mark.parametrize('row', table_after('| rate, Hz | turns', EXAMPLE))
 def test_at_low_rates_the_car_on_half_shafts_is_stable_where_the_other_one_chatters(row):
     rate = float(row[0])
-    runs, references = ([brake_lock.run(BRAKE, 1.5, True, None, coupling, at)
-                         for coupling in brake_lock.CARS] for at in (rate, half_shafts.FINE))
+    runs, references = with_each_coupling(rate), with_each_coupling(half_shafts.FINE)
     assert half_shafts.rate_row(rate, runs, references) == f'| {" | ".join(row)} |'
     held, free = (half_shafts.turns(run.car['right_tyre']) for run in runs)
     assert (held > 0.5) == (rate <= 200.0) and (free < 0.03) == (rate >= 100.0)
