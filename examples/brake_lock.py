@@ -10,7 +10,10 @@ plates  an axle with plates, pressed together by preload and load, and no contro
 els     electronic limited slip: a controller presses the same plates, which are open without it
 
 The differential, the car and the controller are ROS 2 nodes in lockstep, one message a tick.
-With --direct the same classes call each other, to the same bits.
+With --direct the same classes call each other, to the same bits. With --coupling torque the
+inertia of the wheels is in the differential and the car gives the torques of its tyres and brakes;
+with --coupling speed the car owns its wheels and gives their speeds: elastic half-shafts are
+between.
 """
 
 import argparse
@@ -24,9 +27,13 @@ from car import (
     ASPHALT,
     BrakeLock,
     Car,
+    CarOnHalfShafts,
     CarParameters,
     ICE,
     LimitedSlip,
+    Moment,
+    speed_ports,
+    with_engine,
     with_wheels_and_engine,
 )
 import numpy as np
@@ -35,6 +42,8 @@ from dm_ros.files.record import Record
 from dm_ros.testing import DirectDifferential, LockstepDifferential
 
 VARIANT, RATE = 'symmetric_ode', 1000.0   # Hz
+TORQUE, SPEED = 'torque', 'speed'   # couplings
+CARS = {TORQUE: Car, SPEED: CarOnHalfShafts}
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,25 +81,53 @@ class Run(NamedTuple):
 
     case: Case
     record: Record
-    car: dict    # arrays: speed (m/s), left_brake and right_brake (N m)
+    car: dict    # arrays, see car.Moment
     heat: dict   # J: of the brakes and of the clutches
 
+    @property
+    def slip(self):
+        """By which the left wheel outruns the right one, rad/s."""
+        return self.car['left_wheel'] - self.car['right_wheel']
 
-def parameters_of(case, p=None):
+
+def parameters_of(case, p=None, coupling=TORQUE):
     """Return the parameters that the differential of a case has in the car."""
-    return {**with_wheels_and_engine(VARIANT, p or CarParameters()), **dict(case.parameters)}
+    attached = with_engine if coupling == SPEED else with_wheels_and_engine
+    return {**attached(VARIANT, p or CarParameters()), **dict(case.parameters)}
 
 
-def attach(differential, case, rate=RATE, p=None):
+def ports_of(coupling, p=None):
+    """Return the speed ports of the differential in the car."""
+    return speed_ports(VARIANT, p or CarParameters()) if coupling == SPEED else {}
+
+
+def direct_differential(case, rate=RATE, p=None, coupling=TORQUE):
+    """Return the ``DirectDifferential`` of a case."""
+    return DirectDifferential(VARIANT, rate, parameters=parameters_of(case, p, coupling),
+                              ports=ports_of(coupling, p))
+
+
+def lockstep_differential(case, rate=RATE, p=None, coupling=TORQUE):
+    """Return the ``LockstepDifferential`` of a case."""
+    ports = {f'port.{shaft}.{name}': value
+             for shaft, (stiffness, damping) in ports_of(coupling, p).items()
+             for name, value in (('kind', SPEED), ('stiffness', stiffness), ('damping', damping))}
+    return LockstepDifferential(VARIANT, rate, {**parameters_of(case, p, coupling), **ports})
+
+
+def attach(differential, case, rate=RATE, p=None, coupling=TORQUE):
     """Attach the nodes of a case to a ``LockstepDifferential``; return the ``Car``."""
-    from car_nodes import BrakeLockNode, CarNode  # only those who use topics need ROS
+    # only those who use topics need ROS
+    from car_nodes import BrakeLockNode, CarNode, JOINT_STATES, WHEEL_STATES
     from limited_slip import LimitedSlipNode
 
-    car, inputs = Car(1.0 / rate, p), differential.simulation.inputs
+    car, inputs = CARS[coupling](1.0 / rate, p), differential.simulation.inputs
     context, demands = differential.context, None
     if case.controller is BrakeLock:
         demands = 'brake_demands'
-        differential.attach(BrakeLockNode(BrakeLock(1.0 / rate), inputs[1:], context=context))
+        differential.attach(BrakeLockNode(
+            BrakeLock(1.0 / rate), inputs[1:], WHEEL_STATES if car.gives_speeds else JOINT_STATES,
+            context=context))
     elif case.controller is LimitedSlip:
         demands = 'clutch_demands'
         differential.attach(LimitedSlipNode(demands, context=context))
@@ -98,34 +135,34 @@ def attach(differential, case, rate=RATE, p=None):
     return car
 
 
-def law_of(differential, case, rate=RATE, p=None):
+def law_of(differential, case, rate=RATE, p=None, coupling=TORQUE):
     """Return the law for a ``DirectDifferential`` that does the same, and its ``Car``."""
-    car, lock, limited_slip = Car(1.0 / rate, p), BrakeLock(1.0 / rate), LimitedSlip()
-    simulation = differential.simulation
+    car, lock = CARS[coupling](1.0 / rate, p), BrakeLock(1.0 / rate)
+    limited_slip, simulation = LimitedSlip(), differential.simulation
     index = simulation.shafts.index
-    pinion, left, right = map(index, simulation.inputs)
+    inputs = tuple(map(index, simulation.inputs))
     carrier, clutched = index('carrier'), tuple(map(index, simulation.clutches))
 
     def law(snapshot):
         speeds = snapshot.velocity
-        wheels = speeds[left], speeds[right]
-        brakes = lock.brakes(wheels) if case.controller is BrakeLock else (0.0, 0.0)
-        torques = car.torques(speeds[pinion], wheels, brakes)
+        car.see([speeds[k] for k in inputs], snapshot.torque)
+        given = car.answer(
+            lock.brakes(car.wheels) if case.controller is BrakeLock else (0.0, 0.0))
         if case.controller is not LimitedSlip:
-            return torques
-        return torques, tuple(limited_slip.force(speeds[k] - speeds[carrier]) for k in clutched)
+            return given
+        return given, tuple(limited_slip.force(speeds[k] - speeds[carrier]) for k in clutched)
     return law, car
 
 
-def run(case, seconds, direct=False, p=None):
+def run(case, seconds, direct=False, p=None, coupling=TORQUE, rate=RATE):
     """Return the ``Run`` of a case, from rest, with the ``CarParameters`` p."""
     if direct:
-        differential = DirectDifferential(VARIANT, RATE, parameters=parameters_of(case, p))
-        law, car = law_of(differential, case, p=p)
+        differential = direct_differential(case, rate, p, coupling)
+        law, car = law_of(differential, case, rate, p, coupling)
         record = differential.run(law, seconds)
     else:
-        with LockstepDifferential(VARIANT, RATE, parameters_of(case, p)) as differential:
-            car = attach(differential, case, p=p)
+        with lockstep_differential(case, rate, p, coupling) as differential:
+            car = attach(differential, case, rate, p, coupling)
             record = differential.run(seconds)
     return as_run(case, record, car)
 
@@ -133,14 +170,13 @@ def run(case, seconds, direct=False, p=None):
 def as_run(case, record, car):
     """Return the ``Run`` of a record and of the car that made its torques."""
     # the car is at the start of each tick; it may already have answered the last state
-    _, speed, *brakes = np.array(car.history[:len(record)]).T
-    wheels = record.velocity['left'], record.velocity['right']
+    moments = dict(zip(Moment._fields, np.array(car.history[:len(record)]).T))
     powers = {
-        'brakes': [brake * np.tanh(wheel / car.p.brake_soft_speed) * wheel
-                   for brake, wheel in zip(brakes, wheels)],
+        'brakes': [moments[f'{side}_brake'] * np.tanh(wheel / car.p.brake_soft_speed) * wheel
+                   for side in ('left', 'right') for wheel in [moments[f'{side}_wheel']]],
         'clutches': [moment * (record.velocity[shaft] - record.velocity['carrier'])
                      for shaft, moment in clutch_moments(record).items()]}
-    return Run(case, record, dict(zip(('speed', 'left_brake', 'right_brake'), (speed, *brakes))),
+    return Run(case, record, moments,
                {name: float(np.sum(values)) * car.dt for name, values in powers.items()})
 
 
@@ -149,12 +185,13 @@ def report(runs):
     lines = [f'{"":8}{"car":>6}{"slip":>8}{"left brake":>12}{"right tyre":>12}{"clutch":>8}'
              f'{"brakes":>8}{"clutches":>10}',
              f'{"":8}{"m/s":>6}{"rad/s":>8}{"N m":>12}{"N m":>12}{"kN":>8}{"kJ":>8}{"kJ":>10}']
-    for case, record, car, heat in runs:
-        right = record.torque['right']
+    for run in runs:
+        case, record, car, heat = run
         force = max((values.max() for values in record.clutch_force.values()), default=0.0)
-        lines.append(f'{case.name:8}{car["speed"][-1]:6.2f}{abs(record.slip).max():8.1f}'
-                     f'{car["left_brake"].max():12.0f}{-right.min():12.0f}{force / 1e3:8.1f}'
-                     f'{heat["brakes"] / 1e3:8.1f}{heat["clutches"] / 1e3:10.1f}')
+        brakes, clutches = heat['brakes'] / 1e3, heat['clutches'] / 1e3
+        lines.append(f'{case.name:8}{car["speed"][-1]:6.2f}{abs(run.slip).max():8.1f}'
+                     f'{car["left_brake"].max():12.0f}{car["right_tyre"].max():12.0f}'
+                     f'{force / 1e3:8.1f}{brakes:8.1f}{clutches:10.1f}')
     return [*lines, '', 'speed at the end; the greatest slip, torques and force of an actuator; '
             'all heat']
 
@@ -283,11 +320,14 @@ def main(args=None):
                         help='simulated time of a case, default 5')
     parser.add_argument('--ice', type=grip, default=ICE, metavar='GRIP',
                         help=f'friction coefficient of the tyre on ice, default {ICE}')
+    parser.add_argument('--coupling', choices=CARS, default=TORQUE,
+                        help=f'what the wheels give to the differential, default {TORQUE}')
     parser.add_argument('--direct', action='store_true', help='without topics and ROS')
     arguments = parser.parse_args(args)
     arguments.out.mkdir(parents=True, exist_ok=True)
     p = CarParameters(grip=(arguments.ice, ASPHALT))
-    runs = [run(case, arguments.seconds, arguments.direct, p) for case in CASES]
+    runs = [run(case, arguments.seconds, arguments.direct, p, arguments.coupling)
+            for case in CASES]
     for done in runs:
         done.record.save_csv(arguments.out / f'{done.case.name}.csv')
     save_plot(runs, arguments.out / 'example.png')

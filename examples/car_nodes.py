@@ -13,9 +13,16 @@ In lockstep each message on ``~/torques`` is a tick, so exactly one node may pub
 It waits for the joint states and the demands of one stamp, in whichever order they come, and
 answers them with one message of torques, and of forces on the clutches. So nothing depends on
 timing.
+
+A car that owns its wheels gives their speeds in the same message, and the lock gets them from it::
+
+    differential --- joint_states --->  car  --- wheel_states ---> brake_lock
+         ^                             |   ^                           |
+         +---------- torques ----------+   +------ brake_demands ------+
 """
 
 from collections import deque
+import math
 
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
@@ -23,6 +30,8 @@ from sensor_msgs.msg import JointState
 
 # reliable, and nothing is dropped: in lockstep a lost message is a lost tick
 EVERY_MESSAGE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+JOINT_STATES = 'differential/joint_states'
+WHEEL_STATES = 'wheel_states'   # of a car that owns its wheels
 
 
 class BrakeLockNode(Node):
@@ -33,14 +42,14 @@ class BrakeLockNode(Node):
     that of the joint states
 
     :param law: a ``BrakeLock``; wheels: names of the left and the right shaft.
+    :param states: another topic that tells the speeds of the wheels.
     """
 
-    def __init__(self, law, wheels, **node_options):
+    def __init__(self, law, wheels, states=JOINT_STATES, **node_options):
         super().__init__('brake_lock', **node_options)
         self.law, self._wheels = law, wheels
         self._demands = self.create_publisher(JointState, 'brake_demands', EVERY_MESSAGE)
-        self.create_subscription(
-            JointState, 'differential/joint_states', self._answer, EVERY_MESSAGE)
+        self.create_subscription(JointState, states, self._answer, EVERY_MESSAGE)
 
     def restart(self):
         """Go back to the start, as after a reset of the differential."""
@@ -54,12 +63,13 @@ class BrakeLockNode(Node):
 
 class CarNode(Node):
     """
-    Answers the speeds of the shafts, and the demands of a controller, with torques on the shafts.
+    Answers the state of the differential, and the demands of a controller, with what goes in next.
 
     A demand on a wheel is one on its brake, N m; any other goes on to the differential with the
     torques, such as the force on a clutch, N.
 
-    in   ``differential/joint_states`` and the demands   out  ``differential/torques``
+    in   ``differential/joint_states`` and the demands   out  ``differential/torques`` and, of a
+    car that owns its wheels, ``wheel_states``: their speeds, the stamp is that of the joint states
 
     :param car: a ``Car``; inputs: names of the pinion, the left and the right shaft.
     :param demands: the topic of a controller that is to be waited for, None without one.
@@ -70,8 +80,9 @@ class CarNode(Node):
         self.car, self._inputs = car, inputs
         self._states, self._demands = deque(), deque()
         self._torques = self.create_publisher(JointState, 'differential/torques', EVERY_MESSAGE)
-        self.create_subscription(
-            JointState, 'differential/joint_states', self._on_state, EVERY_MESSAGE)
+        self._wheels = self.create_publisher(
+            JointState, WHEEL_STATES, EVERY_MESSAGE) if car.gives_speeds else None
+        self.create_subscription(JointState, JOINT_STATES, self._on_state, EVERY_MESSAGE)
         self._controlled = demands is not None
         if self._controlled:
             self.create_subscription(JointState, demands, self._on_demand, EVERY_MESSAGE)
@@ -83,7 +94,11 @@ class CarNode(Node):
         self._demands.clear()
 
     def _on_state(self, joints):
-        self._states.append(joints)
+        self.car.see(speeds(joints, self._inputs), of(joints.effort, joints, self._inputs))
+        if self._wheels:
+            self._wheels.publish(JointState(
+                header=joints.header, name=self._inputs[1:], velocity=self.car.wheels))
+        self._states.append(joints.header.stamp)
         if not self._controlled:
             self._demands.append(JointState(header=joints.header))
         self._answer()
@@ -94,18 +109,25 @@ class CarNode(Node):
 
     def _answer(self):
         while self._states and self._demands:
-            joints, demands = self._states.popleft(), self._demands.popleft()
-            if joints.header.stamp != demands.header.stamp:
+            stamp, demands = self._states.popleft(), self._demands.popleft()
+            if stamp != demands.header.stamp:
                 raise RuntimeError('the demands do not answer the joint states')
             demanded = dict(zip(demands.name, demands.effort))
-            brakes = [demanded.pop(wheel, 0.0) for wheel in self._inputs[1:]]
-            pinion, *wheels = speeds(joints, self._inputs)
-            torques = self.car.torques(pinion, wheels, brakes)
-            self._torques.publish(JointState(
-                header=joints.header, name=[*self._inputs, *demanded],
-                effort=[*torques, *demanded.values()]))
+            pinion, *wheels = self.car.answer(
+                [demanded.pop(wheel, 0.0) for wheel in self._inputs[1:]])
+            answer = JointState(header=demands.header, name=[*self._inputs, *demanded])
+            none = [math.nan] * 2
+            answer.effort = [pinion, *(none if self._wheels else wheels), *demanded.values()]
+            if self._wheels:
+                answer.velocity = [math.nan, *wheels, *[math.nan] * len(demanded)]
+            self._torques.publish(answer)
 
 
 def speeds(joints, names):
     """Return the speeds of some shafts by name, rad/s, in the order of the names."""
-    return tuple(joints.velocity[joints.name.index(name)] for name in names)
+    return of(joints.velocity, joints, names)
+
+
+def of(values, joints, names):
+    """Return the values of some joints by name, in the order of the names."""
+    return tuple(values[joints.name.index(name)] for name in names)

@@ -16,7 +16,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / 'examples'))
 
 import brake_lock
+import car
 import coupling
+import half_shafts
 
 from dm_ros.energy import AuditedSimulation
 from dm_ros.mechanism.variants import variant_named
@@ -26,6 +28,8 @@ ROOT = Path(__file__).parents[1]
 OPEN, BRAKE, PLATES, ELS = brake_lock.CASES
 NO_PRELOAD = replace(PLATES, parameters=(*PLATES.parameters,
                                          *brake_lock.on_both_sides(preload=0.0)))
+EACH_CASE = pytest.mark.parametrize('case', brake_lock.CASES,
+                                    ids=[case.name for case in brake_lock.CASES])
 PAGE = (ROOT / 'doc' / 'coupling.md').read_text()
 EXAMPLE = (ROOT / 'doc' / 'example.md').read_text()
 
@@ -41,6 +45,12 @@ def on_ice(case, ice=brake_lock.ICE, seconds=5.0, other=brake_lock.ASPHALT):
     """Return the ``Run`` of a case with a grip under the left and the other wheel, kept."""
     p = brake_lock.CarParameters(grip=(ice, other))
     return brake_lock.run(case, seconds, direct=True, p=p)
+
+
+@cache
+def on_half_shafts(case, p=half_shafts.CAR, seconds=5.0, rate=brake_lock.RATE):
+    """Return the ``Run`` of a case with speed ports, kept."""
+    return brake_lock.run(case, seconds, True, p, brake_lock.SPEED, rate)
 
 
 def test_the_lock_brings_torque_to_the_wheel_on_asphalt():
@@ -157,6 +167,90 @@ def test_the_page_of_the_example_says_what_the_command_says():
     # what the text says of the force and of the share of the brake lock
     force, share = lines[5].split()[5], float(lines[5].split()[1]) / float(lines[3].split()[1])
     assert f'up to {force} kN' in EXAMPLE and f'{share:.1f} times' in EXAMPLE
+
+
+# On half-shafts, by speed ports
+
+WITHIN = 1.0   # %
+# where half-shafts of a usual stiffness differ by more, from the time on when they have wound up
+BEYOND = {('open', 'tyre on asphalt'): 1.1, ('plates', 'slip'): 2.4, ('plates', 'heat'): 1.8}
+
+
+def row_of(p, after, case, found):
+    """Return whether the page has a row of the table of differences."""
+    assert half_shafts.row(p, after, case, found) in EXAMPLE.splitlines()
+    return {name: value for name, value in found.items() if not math.isnan(value)}
+
+
+@EACH_CASE
+def test_the_car_on_half_shafts_does_the_same_within_a_percent_once_they_have_wound_up(case):
+    run, reference = on_half_shafts(case), on_ice(case)
+    whole = row_of(half_shafts.CAR, 0.0, case, half_shafts.differences(run, reference))
+    assert whole['speed of the car'] < 0.4 and max(whole.values()) < 6.0
+    after = half_shafts.SETTLED
+    found = row_of(half_shafts.CAR, after, case,
+                   half_shafts.differences(run, reference, after))
+    for name, value in found.items():
+        assert value < BEYOND.get((case.name, name), WITHIN), name
+    assert half_shafts.relative(run, reference, after)['speed of the car'] < 0.5
+
+
+@EACH_CASE
+def test_on_stiffer_half_shafts_all_is_the_same_within_a_percent_at_all_times(case):
+    found = row_of(half_shafts.STIFF, 0.0, case, half_shafts.differences(
+        on_half_shafts(case, half_shafts.STIFF), on_ice(case)))
+    assert max(found.values()) < WITHIN
+    # it is the stiffness, not the exchange: ten times as stiff, a fifth at most
+    soft = half_shafts.differences(on_half_shafts(case), on_ice(case))
+    assert all(found[name] < 0.2 * soft[name] for name in ('tyre on ice', 'tyre on asphalt'))
+
+
+@pytest.mark.parametrize('case', [BRAKE, ELS], ids=['brake', 'els'])
+def test_finer_ticks_and_finer_steps_of_the_wheels_change_next_to_nothing(monkeypatch, case):
+    run = on_half_shafts(case, seconds=0.8)
+    fine = half_shafts.differences(
+        run, on_half_shafts(case, seconds=0.8, rate=half_shafts.FINE))
+    assert 0.0 < max(fine.values()) < 0.3
+    monkeypatch.setattr(car.CarOnHalfShafts, 'STEP', car.CarOnHalfShafts.STEP / 4)
+    steps = half_shafts.differences(run, brake_lock.run(
+        case, 0.8, True, coupling=brake_lock.SPEED))
+    assert 0.0 < max(steps.values()) < 1e-3
+
+
+def test_the_slip_of_the_plates_magnifies_whatever_differs():
+    p = replace(half_shafts.CAR, engine_torque=1.001 * half_shafts.CAR.engine_torque)
+    run, other = on_ice(PLATES), brake_lock.run(PLATES, 5.0, True, p)
+    assert f'{100 * (other.slip[-1] / run.slip[-1] - 1):.0f} % more slip' in EXAMPLE
+    heat, more = (each.heat['clutches'] for each in (run, other))
+    assert f'{100 * (more / heat - 1):.0f} % more heat' in EXAMPLE
+
+
+@cache
+def with_each_coupling(rate):
+    """Return the ``Run`` of the brake lock at a rate, Hz, by torque ports and by speed ports."""
+    return [brake_lock.run(BRAKE, 1.5, True, None, coupling, rate) for coupling in brake_lock.CARS]
+
+
+@pytest.mark.parametrize('row', table_after('| rate, Hz | turns', EXAMPLE))
+def test_at_low_rates_the_car_on_half_shafts_is_stable_where_the_other_one_chatters(row):
+    rate = float(row[0])
+    runs, references = with_each_coupling(rate), with_each_coupling(half_shafts.FINE)
+    assert half_shafts.rate_row(rate, runs, references) == f'| {" | ".join(row)} |'
+    held, free = (half_shafts.turns(run.car['right_tyre']) for run in runs)
+    assert (held > 0.5) == (rate <= 200.0) and (free < 0.03) == (rate >= 100.0)
+    if rate >= 100.0:
+        found = half_shafts.differences(runs[1], references[1])
+        assert found['speed of the car'] < 0.6 and found['slip'] < 5.0
+
+
+def test_a_wheel_of_the_car_on_half_shafts_gets_the_torque_of_its_half_shaft_turned_round():
+    vehicle = car.CarOnHalfShafts(1e-3, car.CarParameters(grip=(0.0, 0.0)))
+    vehicle.see((0.0, 0.0, 0.0), (0.0, 5.0, 5.0))
+    assert vehicle.answer((0.0, 0.0)) == (0.0, 0.0, 0.0)   # no tick had passed
+    for n in range(1, 11):
+        vehicle.see((0.0, 0.0, 0.0), (0.0, -20.0, 30.0))
+        _, left, right = vehicle.answer((0.0, 0.0))
+        assert (left, right) == pytest.approx((n * 0.02, n * -0.03), rel=1e-12)
 
 
 def test_a_demand_on_the_brake_is_limited_and_ends_with_the_slip():

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / 'examples'))
 
 import brake_lock
 
-from dm_ros.testing import lockstep, LockstepDifferential
+from dm_ros.testing import lockstep
 
 ROOT = Path(__file__).parents[2]
 OPEN, BRAKE, PLATES, ELS = brake_lock.CASES
@@ -85,12 +85,26 @@ def test_through_topics_and_direct_are_the_same_to_the_last_bit(case):
         assert (topics.car[name] == values).all(), name
 
 
-@pytest.mark.parametrize('case', [BRAKE, ELS], ids=['brake', 'els'])
-def test_a_reset_of_all_repeats_the_run(monkeypatch, case):
+@pytest.mark.parametrize('case', brake_lock.CASES, ids=[case.name for case in brake_lock.CASES])
+def test_on_half_shafts_too_all_bits_are_the_same_through_topics(case):
+    topics, direct = (brake_lock.run(case, 0.5, direct, coupling=brake_lock.SPEED)
+                      for direct in (False, True))
+    assert (topics.car['left_brake'][-1] > 0.0, 'left' in topics.record.clutch_force
+            and topics.record.clutch_force['left'][-1] > 0.0) == (case is BRAKE, case is ELS)
+    for name, values in direct.record.columns.items():
+        assert (topics.record.columns[name] == values).all(), name
+    for name, values in direct.car.items():
+        assert (topics.car[name] == values).all(), name
+    # the wheels are the car's: the other end of a twisted half-shaft turns otherwise
+    assert topics.car['left_wheel'][-1] != topics.record.velocity['left'][-2]
+
+
+@pytest.mark.parametrize('case, coupling', [
+    (BRAKE, brake_lock.TORQUE), (ELS, brake_lock.TORQUE), (BRAKE, brake_lock.SPEED)])
+def test_a_reset_of_all_repeats_the_run(monkeypatch, case, coupling):
     monkeypatch.setattr(lockstep, 'LAST_ANSWER', 60.0)   # a slow machine may need it
-    with LockstepDifferential(
-            brake_lock.VARIANT, brake_lock.RATE, brake_lock.parameters_of(case)) as vehicle:
-        car = brake_lock.attach(vehicle, case)
+    with brake_lock.lockstep_differential(case, coupling=coupling) as vehicle:
+        car = brake_lock.attach(vehicle, case, coupling=coupling)
         first = vehicle.run(0.5)
         vehicle.reset()
         for node in vehicle.executor.get_nodes():
@@ -112,6 +126,15 @@ def test_the_command_draws_the_picture(tmp_path):
     direct = brake_lock.run(PLATES, 0.1, direct=True, p=brake_lock.CarParameters(
         grip=(0.05, brake_lock.ASPHALT)))
     direct.record.save_csv(tmp_path / 'direct.csv')
+    assert (tmp_path / 'out' / 'plates.csv').read_bytes() == (tmp_path / 'direct.csv').read_bytes()
+
+
+def test_the_command_runs_the_car_on_half_shafts(tmp_path):
+    arguments = '--seconds', 0.1, '--direct', '--coupling', 'speed', '--out', tmp_path / 'out'
+    with Forked(COMMAND, *arguments) as command:
+        assert command.ended() == 0, command.errors
+    brake_lock.run(PLATES, 0.1, True, coupling=brake_lock.SPEED).record.save_csv(
+        tmp_path / 'direct.csv')
     assert (tmp_path / 'out' / 'plates.csv').read_bytes() == (tmp_path / 'direct.csv').read_bytes()
 
 
