@@ -250,7 +250,7 @@ from dm_ros.files.record import Record
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.tools import demo
 rows = numpy.tile(numpy.arange(int(sys.argv[1])) / 7, (len(column_names(SYMMETRIC)), 1)).T
-demo.run_processes = lambda arguments: types.SimpleNamespace(
+demo.run_processes = lambda *_: types.SimpleNamespace(
     record=lambda *_: Record(SYMMETRIC, rows, 'full'), missed=0)
 sys.exit(demo.main(['--out', 'out']))
 """
