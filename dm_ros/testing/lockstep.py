@@ -78,7 +78,15 @@ class LockstepDifferential:
         return self.node.simulation
 
     def attach(self, *nodes):
-        """Let nodes of the test take part, and destroy them in the end; return the first."""
+        """
+        Let nodes of the test take part, and destroy them in the end; return the first.
+
+        :raises ValueError: for a node that was made in another context, which would hear nothing.
+        """
+        for node in nodes:
+            if node.context is not self.context:
+                raise ValueError(f'attach: {node.get_name()} was made in another ROS context and '
+                                 'would hear nothing; give it context=differential.context')
         for node in nodes:
             self.executor.add_node(node)
             self._attached.append(node)
@@ -109,6 +117,7 @@ class LockstepDifferential:
         :param until: function of a ``Snapshot``; true at the last tick.
         :return: the ``Record`` of this run.
         :raises TimeoutError: when no tick comes for ten seconds of real time.
+        :raises ValueError: when the differential refuses an answer; says why.
         """
         first = len(self.snapshots)
         count = ticks_of(seconds, until, self.simulation)
@@ -121,12 +130,19 @@ class LockstepDifferential:
                 self._unanswered = 1
                 self.node.publish_state()
             control.running.set()
+        refusing = self.node.plant.refusing
+        refused = refusing.count
         ticks, end = first, time.monotonic() + PATIENCE
         while control.running.is_set():
             self.executor.spin_once(timeout_sec=0.05)
             if len(self.snapshots) > ticks:
                 ticks, end = len(self.snapshots), time.monotonic() + PATIENCE
-            elif time.monotonic() > end:
+            if refusing.count > refused:
+                control.running.clear()
+                self._unanswered = 0   # nobody will answer the last state any more
+                raise ValueError(f'the differential refused an answer after {ticks - first} '
+                                 f'ticks: {refusing.reason}')
+            if time.monotonic() > end:
                 control.running.clear()
                 raise TimeoutError(
                     f'no tick for {PATIENCE:g} s after {ticks - first} ticks: does a node answer '

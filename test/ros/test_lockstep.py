@@ -5,6 +5,7 @@
 
 import itertools
 import signal
+import time
 from types import SimpleNamespace
 
 from builtin_interfaces.msg import Time
@@ -221,6 +222,54 @@ def test_a_run_ends_to_the_tick_and_says_so_when_nobody_answers(monkeypatch):
         with pytest.raises(TimeoutError, match='no tick for 10 s after 7 ticks'):
             vehicle.run(seconds=1.0)
         assert vehicle.simulation.ticks == 7
+
+
+@pytest.mark.parametrize('effort, words', [
+    ((1.0, float('inf'), 3.0), 'the torque on front is inf'),
+    ((1.0, 2.0), '3 names but 2 values')])
+def test_a_refused_answer_ends_the_run_at_once_with_its_words(effort, words):
+    class Wrong(Controller):
+        def answer(self, joints):
+            if self.heard < 5:
+                super().answer(joints)
+            else:
+                self.torques.publish(JointState(name=['carrier', 'front', 'rear'],
+                                                effort=[float(value) for value in effort]))
+
+    with LockstepDifferential('lsd_ode', 1000.0) as vehicle:
+        controller = vehicle.attach(Wrong(vehicle.context))
+        begin = time.monotonic()
+        with pytest.raises(ValueError, match=f'refused an answer after 5 ticks: .*{words}'):
+            vehicle.run(seconds=1.0)
+        assert time.monotonic() - begin < lockstep.PATIENCE
+        controller.heard = 0   # and it can go on
+        assert len(vehicle.run(seconds=0.004)) == 4
+
+
+def test_a_node_of_another_context_is_refused_when_it_is_attached(ros):
+    with LockstepDifferential('lsd_ode', 1000.0) as vehicle:
+        stranger = Controller(ros.context)
+        try:
+            with pytest.raises(ValueError, match='controller was made in another ROS context'):
+                vehicle.attach(Controller(vehicle.context), stranger)
+        finally:
+            stranger.destroy_node()
+
+
+def test_a_reset_sets_off_a_controller_that_only_answers(ros):
+    node = ros.differential('lsd_ode', mode='lockstep')
+    joints = ros.listen(JointState, '/differential/joint_states')
+    controller = Controller(ros.context, limit=20)
+    ros.executor.add_node(controller)
+    try:
+        ros.until(lambda: node.is_connected())
+        assert not joints
+        ros.call(Trigger, '/differential/reset')
+        ros.until(lambda: len(joints) == 21)   # the first is no tick
+        assert node.simulation.ticks == 20
+    finally:
+        ros.executor.remove_node(controller)
+        controller.destroy_node()
 
 
 def test_a_run_ends_at_its_condition_and_goes_on():
