@@ -35,12 +35,12 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'bias = dm_ros.tools.bias:main',
-            'compare_variants = dm_ros.tools.compare_variants:main',
-            'demo = dm_ros.tools.demo:main',
-            'differential = dm_ros.ros.command:main',
-            'play_torques = dm_ros.tools.play_torques:main',
-            'simulate = dm_ros.tools.simulate:main',
+            'bias = dm_ros.commands:bias',
+            'compare_variants = dm_ros.commands:compare_variants',
+            'demo = dm_ros.commands:demo',
+            'differential = dm_ros.commands:differential',
+            'play_torques = dm_ros.commands:play_torques',
+            'simulate = dm_ros.commands:simulate',
         ],
         'pytest11': ['dm_ros = dm_ros.testing.pytest_plugin'],
     },

@@ -49,8 +49,8 @@ def soak(arguments, folder):
     parameters = ['--ros-args', '-p', f'variant:={arguments.variant}', '-p',
                   f'rate:={arguments.rate!r}']
     with Recorder('/differential', variant_named(arguments.variant).mechanism) as recorder, \
-            process('ros.command', *parameters) as node, \
-            process('tools.play_torques', '--variant', arguments.variant) as player:
+            process('differential', *parameters) as node, \
+            process('play_torques', '--variant', arguments.variant) as player:
         wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft', node, player)
         idle = subprocess.Popen([
             sys.executable, str(Path(__file__).with_name('loop.py')), 'python_loop',

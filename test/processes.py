@@ -23,9 +23,9 @@ SERVER.set_forkserver_preload([   # what is not installed is passed over
     'matplotlib.backends.backend_agg', 'matplotlib.figure'])
 
 
-def command(module):
-    """Return the source that runs a module of the package as its console script does."""
-    return f'import sys; from dm_ros.{module} import main; sys.exit(main())'
+def command(name):
+    """Return the source that runs a command of the package as its console script does."""
+    return f'import sys; from dm_ros.commands import {name}; sys.exit({name}())'
 
 
 def run(source, arguments, streams, folder, environment):

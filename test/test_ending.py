@@ -7,9 +7,12 @@ import os
 from pathlib import Path
 import re
 import signal
+import subprocess
+import sys
 
 import pytest
 
+from dm_ros.commands import COMMANDS
 from dm_ros.ending import run_command, SIGNALS
 
 ROOT = Path(__file__).parents[1]
@@ -83,9 +86,38 @@ def test_handlers_are_given_back_and_what_a_shell_lets_it_ignore_stays_ignored()
 
 
 def test_every_command_ends_so():
-    commands = re.findall(r"'\w+ = dm_ros\.([\w.]+):main'", (ROOT / 'setup.py').read_text())
-    assert len(commands) > 5
-    for module in commands:
-        # command.py is what answers to signals while the node loads
-        path = ROOT / 'dm_ros' / (module.replace('.', '/').replace('command', 'node') + '.py')
+    assert len(COMMANDS) > 5
+    for module, _ in COMMANDS.values():
+        path = ROOT / 'dm_ros' / (module.replace('.', '/') + '.py')
         assert path.read_text().count('return run_command(') == 1, path
+
+
+# a signal comes when Python begins to load the command
+EARLY = """
+import os, sys
+class Loading:
+    def find_spec(name, path, target=None):
+        if name == 'dm_ros.{module}':
+            os.kill(os.getpid(), {number})
+sys.meta_path.insert(0, Loading)
+from dm_ros.commands import {name}
+sys.exit({name}())
+"""
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('name', COMMANDS)
+def test_a_signal_ends_each_command_quietly_also_while_python_loads_it(name, number):
+    module, until_signal = COMMANDS[name]
+    ended = subprocess.run(
+        [sys.executable, '-c', EARLY.format(name=name, module=module, number=int(number))],
+        capture_output=True, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
+    assert (ended.returncode, ended.stdout, ended.stderr) == (
+        0 if until_signal else 128 + number, '', '')
+
+
+def test_the_console_scripts_are_the_commands():
+    text = (ROOT / 'setup.py').read_text()
+    scripts = dict(re.findall(r"'(\w+) = dm_ros\.commands:(\w+)'", text))
+    assert scripts == {name: name for name in COMMANDS}

@@ -9,7 +9,7 @@ records what the node publishes, reports it, and writes a CSV and a picture.
 """
 
 import argparse
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import signal
@@ -17,7 +17,7 @@ import subprocess
 import sys
 import time
 
-from dm_ros.ending import run_command
+from dm_ros.ending import run_command, Signalled
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
@@ -42,7 +42,7 @@ def parser():
                         help=f'what gears and bearings lose, default {node.loss_law}')
     result.add_argument('--duration', type=positive, default=10.0, metavar='S',
                         help='length of the recording, default 10')
-    result.add_argument('--rate', type=positive, metavar='HZ',
+    result.add_argument('--rate', type=float, metavar='HZ',
                         help=f'ticks in a second, default {node.rate:g}')
     result.add_argument('--out', type=Path, default=Path('run'), metavar='FOLDER',
                         help='where the CSV and the PNG go, default run')
@@ -52,14 +52,27 @@ def parser():
 def positive(text):
     number = float(text)
     if not 0.0 < number < 1e6:
-        raise argparse.ArgumentTypeError(f'{text} is not a positive number')
+        raise argparse.ArgumentTypeError(f'{text} is not allowed, it must be in (0, 1e+06)')
     return number
 
 
 @contextmanager
-def process(module, *arguments):
-    """Run a module of the package as a process that ends with the block."""
-    child = subprocess.Popen([sys.executable, '-m', f'dm_ros.{module}', *arguments])
+def folder_for_results(path):
+    """Make a folder, and take it away if nothing came into it."""
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
+    path.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    finally:
+        with suppress(OSError):   # it is not empty
+            for folder in made:
+                folder.rmdir()
+
+
+@contextmanager
+def process(name, *arguments):
+    """Run a command of the package as a process that ends with the block."""
+    child = subprocess.Popen([sys.executable, '-m', 'dm_ros.commands', name, *arguments])
     try:
         yield child
     finally:
@@ -114,9 +127,9 @@ def run_processes(arguments, simulation):
                         ('rate', 1 / simulation.dt)):
         parameters += ['-p', f'{name}:={value}']
     with Recorder(f'{namespace}/differential', simulation.mechanism) as recorder:
-        with process('ros.command', *parameters) as node:
+        with process('differential', *parameters) as node:
             wait(recorder.poll, 'state of the differential', node)
-            with process('tools.play_torques', '--variant', simulation.variant,
+            with process('play_torques', '--variant', simulation.variant,
                          '--node', f'{namespace}/differential') as player:
                 wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft',
                      node, player)
@@ -159,7 +172,16 @@ def run(arguments):
     """Do what the command line says; raise OSError, RuntimeError or ValueError where it fails."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     simulation = simulation_of(arguments)
-    arguments.out.mkdir(parents=True, exist_ok=True)
+    with folder_for_results(arguments.out):
+        try:
+            run_and_write(arguments, simulation)
+        except Signalled:
+            print('demo: ended by a signal, the record is not whole', file=sys.stderr)
+            raise
+
+
+def run_and_write(arguments, simulation):
+    """Run the processes, write the record and report it."""
     with own_domain() as domain:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         recorder = run_processes(arguments, simulation)

@@ -26,7 +26,7 @@ from dm_ros.mechanism.variants import (
     VARIANTS,
     WITH_CLUTCHES,
 )
-from dm_ros.settings import port_parameters, speed_ports
+from dm_ros.settings import NodeParameters, port_parameters, speed_ports
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
@@ -52,7 +52,7 @@ def parser():
                         help='the same by the variant in the ROS 2 parameter file of the node, '
                         'and which ports take a speed')
     result.add_argument('--torques', metavar='CSV', help='play this file, not the built-in load')
-    result.add_argument('--rate', type=_positive, default=100.0, metavar='HZ',
+    result.add_argument('--rate', type=float, default=100.0, metavar='HZ',
                         help='messages in a second; default: 100')
     result.add_argument('--duration', type=_positive, metavar='S',
                         help='how long to play; default: to the end of CSV, or endless')
@@ -136,11 +136,11 @@ class Player:
 
 def load(arguments):
     """
-    Return what to play: ports, a function of n, the number of messages or None.
+    Return what to play: rate, ports, a function of n, the number of messages or None.
 
     :raises ValueError: for a CSV that is not as it should be, or none where one is needed.
     """
-    rate, count = arguments.rate, None
+    rate, count = NodeParameters().changed({'rate': arguments.rate}).rate, None
     values = read_parameter_file(arguments.params) if arguments.params else {}
     mechanism = (MECHANISMS[arguments.profile] if arguments.profile
                  else variant_named(values.get('variant', arguments.variant)).mechanism)
@@ -159,7 +159,7 @@ def load(arguments):
             return mechanism.load(n / rate)
     if arguments.duration:
         count = max(1, round(arguments.duration * rate))
-    return ports, torques_at, count
+    return rate, ports, torques_at, count
 
 
 def run(args):
@@ -167,12 +167,12 @@ def run(args):
     player = None
     try:
         arguments = parser().parse_args(remove_ros_args(args)[1:])
-        ports, torques_at, count = load(arguments)
+        rate, ports, torques_at, count = load(arguments)
         # rclpy's own handlers would shut down before the zero torques are out
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         player = Player(rclpy.create_node('play_torques'), arguments.node, ports)
         player.wait(arguments.wait)
-        player.play(torques_at, arguments.rate, count)
+        player.play(torques_at, rate, count)
     finally:
         ignore_signals()
         if player:

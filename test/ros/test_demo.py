@@ -6,6 +6,8 @@
 from contextlib import ExitStack
 import csv
 from pathlib import Path
+import signal
+import time
 
 from processes import command, Forked
 import pytest
@@ -13,7 +15,7 @@ import pytest
 from dm_ros.files.columns import column_names
 from dm_ros.motion.simulation import Simulation
 
-DEMO = command('tools.demo')
+DEMO = command('demo')
 VARIANTS = ('symmetric_dae', 'lsd_lagged')
 LAWS = {'symmetric_dae': 'passive', 'lsd_lagged': 'paper'}
 PRESETS = Path(__file__).parents[2] / 'config' / 'presets'
@@ -85,3 +87,27 @@ def test_a_file_with_a_speed_port_is_refused_in_one_line(tmp_path):
         assert demo.ended() == 1
         line, = demo.errors.strip().splitlines()
     assert line.endswith('the load is torques, but left would take a speed')
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (('--rate', '1e9'), 'demo: error: rate: 1000000000.0 is not allowed, it must be in '
+                        '[0.1, 10000]'),
+    (('--duration', '0'), '0 is not allowed, it must be in (0, 1e+06)')])
+def test_a_limit_is_told_in_words(tmp_path, arguments, words):
+    with Forked(DEMO, *arguments, '--out', tmp_path / 'run') as demo:
+        assert demo.ended() in (1, 2)
+        assert demo.errors.strip().endswith(words)
+    assert not (tmp_path / 'run').exists()
+
+
+def test_a_signal_leaves_no_empty_folder_and_one_line(tmp_path):
+    with Forked(DEMO, '--out', tmp_path / 'a' / 'run') as demo:
+        end = time.monotonic() + 60.0
+        while not (tmp_path / 'a' / 'run').is_dir():
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        assert demo.ended(signal.SIGINT) == 130
+        line, = [line for line in demo.errors.splitlines() if line.startswith('demo')]
+        assert line == 'demo: ended by a signal, the record is not whole'
+        assert 'Traceback' not in demo.errors
+    assert not list(tmp_path.iterdir())

@@ -24,11 +24,11 @@ from dm_ros.files.record import Record
 from dm_ros.testing import DirectDifferential
 
 ROOT = Path(__file__).parents[2]
-NODE = command('ros.command')
+NODE = command('differential')
 # as the command does, and it tells when a signal no longer is the interpreter's affair
 TELLING_NODE = """
 import signal, sys
-from dm_ros.ros.command import main
+from dm_ros.commands import differential as main
 set_handler, told = signal.signal, []
 def tell(number, handler):
     set_handler(number, handler)

@@ -286,7 +286,7 @@ def test_a_run_ends_at_its_condition_and_goes_on():
 
 
 def test_a_stopped_and_continued_process_misses_no_tick(ros):
-    with Forked(command('ros.command'), '--ros-args', '-p', 'mode:=lockstep', '-p',
+    with Forked(command('differential'), '--ros-args', '-p', 'mode:=lockstep', '-p',
                 'variant:=lsd_ode', '-p', 'rate:=1000.0') as process:
         heard = ros.listen(JointState, '/differential/joint_states', depth=5000)
         publisher = ros.publisher(JointState, '/differential/torques', depth=5000)

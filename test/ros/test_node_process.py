@@ -14,7 +14,7 @@ CONFIG = Path(__file__).parents[2] / 'config'
 
 
 def start(*arguments):
-    return Forked(command('ros.command'), *arguments)
+    return Forked(command('differential'), *arguments)
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])

@@ -23,7 +23,7 @@ def play(ros):
     """Return a function that starts the tool and returns the process, ended after the test."""
     with ExitStack() as stack:
         yield lambda *arguments: stack.enter_context(
-            Forked(command('tools.play_torques'), *arguments))
+            Forked(command('play_torques'), *arguments))
 
 
 def listen(ros, topic='/differential/torques'):
@@ -73,7 +73,7 @@ def test_plays_a_file_to_its_end(ros, play, tmp_path):
     file.write_text('right,time,left,pinion\n' + ''.join(
         f'{right},{n / 50},{left},{pinion}\n' for n, (pinion, left, right) in enumerate(rows)))
     arguments = ['--torques', str(file), '--wait', '60']
-    _, torques_at, count = load(parser().parse_args(arguments))
+    _, _, torques_at, count = load(parser().parse_args(arguments))
     assert [torques_at(n) for n in range(count)] == [row for row in rows[:-1] for _ in range(2)]
     messages = listen(ros)
     process = play(*arguments)
@@ -120,7 +120,8 @@ def test_drives_the_node(ros, play):
 @pytest.mark.parametrize('arguments, part', [
     (['--torques', 'missing.csv'], 'missing.csv: No such file'),
     (['--node', 'no name'], 'topic name'),
-    (['--rate', '0'], '--rate: 0 must be above 0'),
+    (['--rate', '0'], 'rate: 0.0 is not allowed, it must be in [0.1, 10000]'),
+    (['--rate', '20000'], 'rate: 20000.0 is not allowed, it must be in [0.1, 10000]'),
     (['--duration', 'nan'], '--duration: nan must be in'),
     (['--profile', 'lsd', '--variant', 'lsd_ode'], 'not allowed with'),
     (['--params', 'missing.yaml'], 'missing.yaml: No such file'),
