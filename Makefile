@@ -24,6 +24,15 @@ PACKAGING := Makefile package.xml setup.cfg setup.py
 # pip writes console scripts to bin/ whatever setup.cfg says, if it builds by PEP 517.
 PIP_INSTALL := bin/pip install --quiet --use-pep517
 
+# What takes long says so; what cannot work says so at once.
+OLD_PYTHON = import sys; sys.version_info < (3, 11) and sys.exit( \
+  "make: dm_ros needs Python 3.11 or newer, $(BASE) is %d.%d: make PYTHON=..." % sys.version_info[:2])
+define begin_venv
+@$(BASE) -c '$(OLD_PYTHON)'
+@echo "making $(@D), once: packages are fetched, which takes about a minute"
+rm -rf $(@D)
+endef
+
 # What .venv-lint, .venv-bench, .venv-docs and .venv-jazzy hold, and what colcon adds to .venv.
 lint := ruff==0.17.6
 bench := --editable . mujoco==4.0.0 control==0.10.2
@@ -38,14 +47,14 @@ setup: .venv/$(ROS)  ## make .venv, with a sourced ROS 2 or else with its wheels
 
 # The last command makes the stamp: a .venv without it is made anew.
 .venv/pypi: $(PACKAGING)
-	rm -rf .venv
+	$(begin_venv)
 	$(BASE) -m venv .venv
 	.venv/$(PIP_INSTALL) --editable '.[$(EXTRAS)]'
 	touch $@
 
 # Needs no network when rosdep has installed the dependencies; numpy stays the one of ROS.
 .venv/ros: $(PACKAGING)
-	rm -rf .venv
+	$(begin_venv)
 	$(BASE) -m venv --system-site-packages .venv
 	.venv/$(PIP_INSTALL) setuptools wheel
 	.venv/$(PIP_INSTALL) --no-build-isolation --editable '.[test]' \
@@ -53,15 +62,17 @@ setup: .venv/$(ROS)  ## make .venv, with a sourced ROS 2 or else with its wheels
 	touch $@
 
 .venv-%/done: $(PACKAGING)
-	rm -rf $(@D)
+	$(begin_venv)
 	$(BASE) -m venv $(@D)
 	env -u PYTHONPATH $(@D)/$(PIP_INSTALL) $($*)
 	touch $@
 
 run: setup  ## run the demo: VARIANT, LOSS_LAW, DURATION in s, RATE in Hz, OUT a folder
+	@echo "running the demo: $(DURATION) s and some"
 	.venv/bin/demo --variant $(VARIANT) --loss-law $(LOSS_LAW) --duration $(DURATION) --rate $(RATE) --out $(OUT)
 
 test: setup  ## run the tests: PYTEST_ARGS
+	@echo "running the tests: some minutes on two cores"
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \
 	  .venv/bin/python -m pytest $(PARALLEL) $(PYTEST_ARGS)
 

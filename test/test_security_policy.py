@@ -10,6 +10,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from dm_ros.commands import COMMANDS
+
 ROOT = Path(__file__).parents[1]
 POLICY = ROOT / 'config' / 'sros2_policy.xml'
 # tag: (allowed attributes, allowed children), as in the schema of policies of version 0.2.0
@@ -131,8 +133,8 @@ def recipe_lines():
 
 def started_by_make():
     """Yield (path, recipe line) of each script and each command of this project in a recipe."""
-    commands = {name: ROOT / f'{module.replace(".", "/")}.py' for name, module in re.findall(
-        r"'(\w+) = ([\w.]+):main'", (ROOT / 'setup.py').read_text())}
+    commands = {name: ROOT / 'dm_ros' / f'{module.replace(".", "/")}.py'
+                for name, (module, _) in COMMANDS.items()}
     for line in recipe_lines():
         for script in re.findall(r'\S+\.py\b', line):
             yield ROOT / script, line

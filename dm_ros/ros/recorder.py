@@ -87,7 +87,7 @@ class Recorder:
 
     def record(self, duration, title):
         """
-        Return the ``Record``, whose time begins with the first tick.
+        Return the ``Record``, whose time begins with the last tick before the first torque.
 
         :param duration: s, what came later is left out; title: of the record.
         :raises RuntimeError: for a record without two whole ticks.
@@ -95,6 +95,9 @@ class Recorder:
         table = np.array(list(self._rows()))
         if len(table) < 2:
             raise RuntimeError('the record is empty')
+        shafts = len(self._mechanism.shafts)
+        torques = table[:, 1 + 2 * shafts:][:, :len(self._mechanism.inputs)]
+        table = table[max(0, int(torques.any(axis=1).argmax()) - 1):]
         table[:, 0] -= table[0, 0]
         return Record(self._mechanism, table[table[:, 0] <= duration], title)
 

@@ -129,12 +129,12 @@ def run_processes(arguments, simulation):
     with Recorder(f'{namespace}/differential', simulation.mechanism) as recorder:
         with process('differential', *parameters) as node:
             wait(recorder.poll, 'state of the differential', node)
+            wait(next_report(recorder), 'report of the differential', node)
+            recorder.clear()
             with process('play_torques', '--variant', simulation.variant,
                          '--node', f'{namespace}/differential') as player:
                 wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft',
                      node, player)
-                wait(next_report(recorder), 'report of the differential', node, player)
-                recorder.clear()
                 end = time.monotonic() + arguments.duration
                 with progress(total=round(arguments.duration / simulation.dt)) as bar:
                     while (left := end - time.monotonic()) > 0.0:

@@ -54,8 +54,14 @@ def test_it_records_what_the_node_publishes_and_draws_it(runs, variant):
     times = [float(row['time']) for row in rows]
     assert times[0] == 0.0
     assert times == sorted(times)
+    # from the first torque, from rest
+    driving = f'torque.{Simulation(variant).inputs[0]}'
+    assert not any(float(rows[0][f'torque.{name}']) for name in Simulation(variant).inputs)
+    assert any(float(rows[1][f'torque.{name}']) for name in Simulation(variant).inputs)
+    assert not any(float(value) for name, value in rows[0].items()
+                   if name.startswith(('velocity', 'position')))
     # the torques arrived and the shafts turned
-    for column in (f'torque.{Simulation(variant).inputs[0]}', 'velocity.carrier'):
+    for column in (driving, 'velocity.carrier'):
         assert any(float(row[column]) for row in rows)
     assert (folder / f'{variant}.png').read_bytes().startswith(b'\x89PNG')
 
