@@ -440,7 +440,8 @@ def test_a_step_of_no_half_shaft_is_one_of_the_adaptive_kind():
 
 @pytest.mark.parametrize('ports, words', [
     ({'wheel': SHAFT}, "ports: 'wheel' is not one of pinion, left, right"),
-    ({'left': 5.0}, 'ports: 5.0 of left is no stiffness and damping'),
+    ({'left': 5.0}, 'ports: left: 5.0 must be two numbers, stiffness and damping'),
+    (['left'], "ports: ['left'] must be {shaft: (stiffness, damping)}"),
     ({'left': (0.0, 1.0)}, 'port.left.stiffness: 0.0 is not allowed'),
     ({'left': (1e4, -1.0)}, 'port.left.damping: -1.0 is not allowed'),
     ({'left': (1e4, math.nan)}, 'port.left.damping: nan is not allowed')])
@@ -454,9 +455,9 @@ def test_what_is_no_port_is_refused_by_name(ports, words):
     ((1.0, math.nan, 2.0), 'the speed on left is nan'),
     ((1.0, math.inf, 2.0), 'the speed on left is inf'),
     ((1.0, 2e6, 2.0), 'the speed on left is 2000000.0, it must not be above 1e+06'),
-    ((None, 1.0, 2.0), 'must be 3 numbers'),
+    ((None, 1.0, 2.0), 'None is not allowed on pinion, it takes a torque'),
     ((1.0, 2.0), 'must be 3 numbers, for pinion, left, right'),
-    ((1.0, 'x', 2.0), 'must be 3 numbers'), (5.0, 'must be 3 numbers')])
+    ((1.0, 'x', 2.0), "(1.0, 'x', 2.0) must be 3 numbers"), (5.0, '5.0 must be 3 numbers')])
 def test_what_cannot_come_in_is_refused_and_changes_nothing(inputs, words):
     simulation = Simulation('symmetric_ode', ports={'left': SHAFT})
     simulation.step((10.0, 5.0, -3.0))

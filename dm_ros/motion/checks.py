@@ -15,13 +15,18 @@ def checked_ports(ports, inputs):
     :param inputs: names of the shafts that may have a speed port.
     """
     result = {}
-    for shaft, pair in dict(ports).items():
+    try:
+        ports = dict(ports)
+    except (TypeError, ValueError):
+        raise ValueError(f'ports: {ports!r} must be {{shaft: (stiffness, damping)}}') from None
+    for shaft, pair in ports.items():
         if shaft not in inputs:
             raise ValueError(f'ports: {shaft!r} is not one of {", ".join(inputs)}')
         try:
             stiffness, damping = pair
         except (TypeError, ValueError):
-            raise ValueError(f'ports: {pair!r} of {shaft} is no stiffness and damping') from None
+            raise ValueError(f'ports: {shaft}: {pair!r} must be two numbers, stiffness and '
+                             'damping') from None
         table = PORT_TABLES[shaft](stiffness=stiffness, damping=damping)
         result[shaft] = table.stiffness, table.damping
     return result

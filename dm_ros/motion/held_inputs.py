@@ -81,6 +81,9 @@ class HeldInputs:
 
     def _of_kinds(self, names, efforts, velocities):
         """Return one value for each name, the one that its port takes."""
+        for name in names:
+            if name not in self._index:
+                raise ValueError(f'{name!r} is not one of {", ".join(self.names)}')
         kinds = [name in self._speeds for name in names]
         for what, values, needed in (('efforts', efforts, False),
                                      ('velocities', velocities, True)):

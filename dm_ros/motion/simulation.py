@@ -327,11 +327,15 @@ class Simulation:
         """Return the inputs where some ports take a speed, or None."""
         ports = self.mechanism.ports
         try:
-            free = [port.idle is None and value is None
-                    for port, value in zip(ports, inputs, strict=True)]
+            free = [value is None for _, value in zip(ports, inputs, strict=True)]
         except (TypeError, ValueError):
             free = []
-        given = (0.0 if gone else value for gone, value in zip(free, inputs)) if free else inputs
+        for port, gone in zip(ports, free):
+            if gone and port.idle is not None:
+                raise ValueError(f'torques: None is not allowed on {port.name}, it takes a '
+                                 f'{port.kind}')
+        given = (tuple([0.0 if gone else value for gone, value in zip(free, inputs)])
+                 if free else inputs)
         values = numbers_for('torques', given, ports)
         refuse('torques', values, ports)
         return tuple([None if gone else value for gone, value in zip(free, values)])

@@ -52,4 +52,6 @@ def ticks_of(seconds, until, simulation):
     """Return the number of ticks of a run, None for as many as the condition takes."""
     if seconds is None and until is None:
         raise ValueError('seconds, until: one of them must say when the run ends')
+    if seconds is not None and not seconds > 0.0:
+        raise ValueError(f'seconds: {seconds!r} is not allowed, it must be above 0')
     return None if seconds is None else round(seconds / simulation.dt)

@@ -26,7 +26,12 @@ class LockstepDifferential:
     """
 
     def __init__(self, variant='symmetric_ode', rate=1000.0, parameters=None):
-        self._options = {**(parameters or {}), 'variant': variant, 'rate': float(rate),
+        parameters = dict(parameters or {})
+        for name in ('variant', 'rate', 'mode'):
+            if name in parameters:
+                raise ValueError(f'parameters: {name} is not one of them here; variant and rate '
+                                 'are arguments, and mode is lockstep')
+        self._options = {**parameters, 'variant': variant, 'rate': float(rate),
                          'mode': 'lockstep'}
         self.snapshots = []
         self._unanswered = 0   # states that the nodes of the test have still to answer: 0 or 1

@@ -33,7 +33,7 @@ symmetric with friction surfaces: left_clutch, right_clutch). A row's torques an
 the time of the next row; before the first row they are zero; the time of the last row ends the
 run, which begins at time 0. Each tick takes what is in force at its start; a time less than 1/1000
 of a tick after that start counts as on it. The column of a shaft with a speed port of FILE
-(port.<shaft>.kind: speed) is the speed outside in rad/s.
+(port.<shaft>.kind: speed) is the speed outside in rad/s; before the first row the shaft is free.
 
 OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), torque.<input>
 (N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse), clutch_force.<clutch> (N): a row

@@ -246,6 +246,12 @@ def test_a_refused_answer_ends_the_run_at_once_with_its_words(effort, words):
         assert len(vehicle.run(seconds=0.004)) == 4
 
 
+@pytest.mark.parametrize('name, value', [('rate', 50.0), ('mode', 'realtime'), ('variant', 'x')])
+def test_a_parameter_that_is_an_argument_is_refused(name, value):
+    with pytest.raises(ValueError, match=f'parameters: {name} is not one of them here'):
+        LockstepDifferential('lsd_ode', 1000.0, {name: value})
+
+
 def test_a_node_of_another_context_is_refused_when_it_is_attached(ros):
     with LockstepDifferential('lsd_ode', 1000.0) as vehicle:
         stranger = Controller(ros.context)

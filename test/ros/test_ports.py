@@ -192,7 +192,8 @@ def test_it_tells_which_ports_still_wait(ros):
     (demand(('right',), (5.0,), (3.0,)), 'right takes no speed, its velocity must be NaN'),
     (demand(('left',), (), (math.inf,)), 'the speed on left is inf'),
     (demand(('left',), (), (-2e6,)), 'the speed on left is -2000000.0, it must not be below'),
-    (demand(('wheel',), (1.0,)), "'wheel' is not one of")])
+    (demand(('wheel',), (1.0,)), "'wheel' is not one of"),
+    (demand(('lft',), (), (5.0,)), "'lft' is not one of")])
 def test_what_a_speed_port_cannot_take_is_refused_whole_and_named(ros, message, words):
     node = ros.differential('symmetric_ode', mode='lockstep', **LEFT)
     joints = ros.listen(JointState, JOINTS)
