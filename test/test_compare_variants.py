@@ -123,6 +123,20 @@ def test_own_load_and_parameters_are_taken_and_named():
     assert 'symmetric_ode' not in page.text
 
 
+def test_a_log_is_taken_from_its_begin_and_what_it_loses_is_told(tmp_path, capsys):
+    file = tmp_path / 'log.csv'
+    file.write_text('time,gear,pinion,left,right\n' + ''.join(
+        f'{1748873654 + n / 1000:.3f},D,{n},-1,-1\n' for n in range(101)))
+    chosen, _ = compare_variants.loads(compare_variants.parser().parse_args(
+        ['--mechanism', 'symmetric', '--torques', str(file), '--ignore-columns', 'gear']))
+    load, = chosen.values()
+    assert load.seconds == 0.1 and [row[0] for row in load.held(1000)] == list(range(100))
+    begin, lost = capsys.readouterr().err.splitlines()
+    assert begin.startswith(f'compare_variants: {file}: time 0 is 1748873654.0 s in the file')
+    assert lost == (f'compare_variants: {file}: 90 of 101 rows are never in force in ticks of '
+                    '0.01 s')
+
+
 def test_a_load_at_rest_makes_a_page_without_a_warning(recwarn):
     with open('IN.csv', 'w') as file:
         file.write('time,carrier,rear,front\n0,0,0,0\n1,0,0,0\n')

@@ -85,13 +85,15 @@ def test_the_later_section_wins(read):
 
 
 @pytest.mark.parametrize('text, value', [
-    ('1e-3', 1e-3), ('1E3', 1e3), ('.5', 0.5), ('5.', 5.0), ('+1.0', 1.0), ('1.e1', 10.0)])
+    ('1e-3', 1e-3), ('1E3', 1e3), ('.5', 0.5), ('5.', 5.0), ('+1.0', 1.0), ('1.e1', 10.0),
+    ('08', 8.0), ('05.0', 5.0), ('0x1p3', 8.0)])
 def test_doubles_are_those_of_ros(read, text, value):
     text = f'/**: {{ros__parameters: {{torque_timeout: {text}}}}}'
     assert read(text) == {'torque_timeout': value}
 
 
-@pytest.mark.parametrize('text, value', [('16', 16), ('0x10', 16), ('010', 8), ('+2', 2)])
+@pytest.mark.parametrize('text, value', [('16', 16), ('0x10', 16), ('010', 8), ('+2', 2),
+                                         ('05', 5)])
 def test_integers_are_those_of_ros(read, text, value):
     assert read(f'/**: {{ros__parameters: {{substeps: {text}}}}}') == {'substeps': value}
 
@@ -130,8 +132,16 @@ def test_an_empty_file_gives_nothing(read):
     ('"a\\nb": 1.0', ['there is no such parameter']),
     ('symmetric.final_drive_ratio: 0.0', ['symmetric.final_drive_ratio: 0.0', 'not be 0']),
     ('lsd.clutch.rear.friction_coefficient: 9.0', ['lsd.clutch.rear', 'locks itself']),
-    ('{rate: 1.0, rate: 2.0}', ['rate: given twice']),
+    ('{rate: 1.0, rate: 2.0}', ['rate: given twice', 'line 1', 'would take the last']),
     ('{lsd.inertia.rear: 1.0, lsd: {inertia.rear: 1.0}}', ['lsd.inertia.rear: given twice']),
+    ('{rate: 1.0, rate: {a: 2.0}}', ['rate: given twice']),
+    ('substeps: 05.0', ['substeps: 5.0 is a double']),
+    ('rate: 05', ['rate: 5 is an integer']),
+    ('rate: 1e-310', ["rate: '1e-310' is a string"]),
+    ('rate: 1e999', ["rate: '1e999' is a string"]),
+    ('rate: !!float 5', ['line 1', 'YAML tag']),
+    ('rate: [[5.0]]', ['rate: a list has single values']),
+    ('{lsd: {}, rate: 5.0}', ['lsd: there is no name below it']),
 ])
 def test_bad_parameters_are_refused_by_name(read, tmp_path, parameters, parts):
     parameters = parameters if parameters.startswith('{') else f'{{{parameters}}}'
@@ -151,6 +161,8 @@ def test_bad_parameters_are_refused_by_name(read, tmp_path, parameters, parts):
     ('/**:\n  rate: 1.0', 'ros__parameters'),
     ('/**:', 'ros__parameters'),
     ('ros__parameters:\n  rate: 1.0', 'below a node'),
+    ('/**: {ros__parameters: {}, ros__parameters: {}}', 'nothing may follow'),
+    ('//a: {ros__parameters: {}}', 'cannot be the name of a node, line 1'),
     ('/**: {ros__parameters: 3}', 'ros__parameters'),
     ('/**: {ros__parameters: {rate: &a 1.0, torque_timeout: *a}}', 'aliases'),
     ('[' * 600 + ']' * 600, 'nested too deeply'),

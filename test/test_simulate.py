@@ -3,6 +3,7 @@
 
 """The tool ``simulate``: its files, its numbers, and how it refuses bad input."""
 
+from decimal import Decimal
 import math
 import os
 import signal
@@ -153,6 +154,175 @@ def test_before_the_first_row_the_torques_are_zero():
 def test_the_last_time_ends_the_run(end, ticks):
     held = TorqueTable((0.0, end), ((1.0,), (2.0,)), (0.0,)).held(0.1)
     assert len(held) == sum(1 for _ in held) == ticks
+
+
+@pytest.mark.parametrize('begin', ['1748873654', '1748873654.123', '1748873654123.25', '1000.5'])
+def test_a_file_that_begins_at_an_epoch_begins_the_run(folder, capfd, begin):
+    """Its rows are on their ticks, though a double has few digits left at an epoch."""
+    rows = [(Decimal(begin) + n * Decimal('0.0001'), n) for n in range(500)]
+    (folder / 'IN.csv').write_text('time,pinion,left,right\n' + ''.join(
+        f'{time},{n},-1,-1\n' for time, n in rows))
+    assert simulate('--out', 'OUT.csv', '--dt', '0.0001') == 0
+    assert list(table()['torque.pinion'][1:]) == list(range(499))
+    told, summary = capfd.readouterr().err.splitlines()
+    assert told.startswith(f'simulate: IN.csv: time 0 is {float(begin)!r} s in the file')
+    assert ('in ms, divide them by 1000' in told) == (begin == '1748873654123.25')
+    assert summary.startswith('simulate: 499 ticks, 0.0499 s')
+
+
+def test_a_file_that_begins_a_little_later_holds_zeros_until_then(folder, capfd):
+    (folder / 'IN.csv').write_text('time,pinion,left,right\n1000,10,-15,-16\n1001,0,0,0\n')
+    assert simulate('--out', 'OUT.csv', '--dt', '0.5') == 0
+    assert list(table()['torque.pinion']) == [0.0] * 2001 + [10.0] * 2
+    assert capfd.readouterr().err.count('\n') == 1
+
+
+def test_times_of_an_epoch_that_do_not_increase_are_refused(folder, capfd):
+    (folder / 'IN.csv').write_text('time,pinion,left,right\n1748873654.5,1,2,3\n'
+                                   '1748873654.75,1,2,3\n1748873654.75,1,2,3\n')
+    refused(folder, capfd, "IN.csv:4: column 'time': 0.25 after 1748873654.5 s does not come "
+            'after 0.25 after 1748873654.5 s')
+
+
+def test_a_file_of_an_epoch_needs_a_second_row(folder, capfd):
+    (folder / 'IN.csv').write_text('time,pinion,left,right\n1748873654,10,-15,-16\n')
+    refused(folder, capfd, "IN.csv:2: column 'time': a row with a time above 1748873654 must")
+
+
+def test_many_ticks_are_told_before_and_too_many_are_refused(folder, capfd, monkeypatch):
+    (folder / 'IN.csv').write_text('time,pinion,left,right\n0,1,2,3\n1748873654,1,2,3\n')
+    refused(folder, capfd, 'IN.csv: time: 349774730800 ticks of 0.005 s, about 107 TB of CSV, '
+            'run only with --yes', '--out', 'OUT.csv')
+    (folder / 'IN.csv').write_text(GOOD)
+    monkeypatch.setattr('dm_ros.tools.simulate.MANY_TICKS', 999)
+    monkeypatch.setattr('dm_ros.tools.simulate.MOST_TICKS', 1999)
+    assert simulate('--dt', '0.001', '--out', 'OUT.csv') == 0
+    told, _ = capfd.readouterr().err.splitlines()
+    words = 'simulate: 1000 ticks of 0.001 s, about '
+    assert told.startswith(words) and told.endswith(' kB of CSV')
+    size = float(told.removeprefix(words).split()[0]) * 1e3
+    assert size / 1.5 < os.path.getsize('OUT.csv') < size * 1.5
+    refused(folder, capfd, 'IN.csv: time: 2000 ticks of 0.0005 s, about ', '--dt', '0.0005')
+    assert simulate('--dt', '0.0005', '--yes', '--plot', 'OUT.png') == 0
+    assert ' kB of memory\n' in capfd.readouterr().err
+
+
+def write_times(folder, times):
+    (folder / 'IN.csv').write_text('time,pinion,left,right\n' + ''.join(
+        f'{time},{n},-1,-1\n' for n, time in enumerate(times)))
+
+
+LOGS = {   # times, further arguments, rows never in force, what takes all
+    '1 kHz': ([f'{n / 1000:.3f}' for n in range(601)], [], 480, '0.001'),
+    '60 Hz in ms': ([f'{n / 60:.3f}' for n in range(601)], ['--dt', str(1 / 60)], 200, '0.016'),
+    'jitter': ([0.0, 0.011, 0.0123, 0.03, 0.0309, 0.05], [], 1, '0.0009'),
+    'the end': ([0.0, 0.012, 0.0172], ['--dt', '0.01'], 1, '0.00468')}
+
+
+@pytest.mark.parametrize('log', LOGS)
+def test_rows_that_are_never_in_force_are_counted_and_auto_takes_all(folder, capfd, log):
+    times, arguments, lost, dt = LOGS[log]
+    write_times(folder, times)
+    assert simulate('--out', 'OUT.csv', *arguments) == 0
+    told, _ = capfd.readouterr().err.splitlines()
+    assert told.startswith(f'simulate: IN.csv: {lost} of {len(times)} rows are never in force')
+    named = told.split('--dt ')[1].split()[0]
+    assert named == dt
+    assert {*table()['torque.pinion'][1:]} < {*range(len(times) - 1)}
+    assert simulate('--out', 'OUT.csv', '--dt', named) == 0
+    assert capfd.readouterr().err.count('\n') == 1
+    assert {*table()['torque.pinion'][1:]} == {*range(len(times) - 1)}
+    (folder / 'p.yaml').write_text(
+        f'/**: {{ros__parameters: {{rate: {1 / float((arguments or ["", 0.005])[1])}}}}}')
+    assert simulate('--out', 'AUTO.csv', '--dt', 'auto', '--params', 'p.yaml') == 0
+    assert capfd.readouterr().err.count('\n') == 1
+    assert (folder / 'AUTO.csv').read_bytes() == (folder / 'OUT.csv').read_bytes()
+
+
+def test_auto_is_the_default_where_that_takes_all(folder):
+    assert simulate('--out', 'OUT.csv') == 0
+    assert simulate('--out', 'AUTO.csv', '--dt', 'auto') == 0
+    assert (folder / 'AUTO.csv').read_bytes() == (folder / 'OUT.csv').read_bytes()
+    write_times(folder, [0, 1e-3])   # a whole run in less than half a default tick
+    assert simulate('--out', 'AUTO.csv', '--dt', 'auto') == 0
+    assert len(table('AUTO.csv')) == 2
+
+
+@pytest.mark.parametrize('seed', range(200))
+def test_each_table_has_a_tick_that_takes_all_its_rows(seed):
+    random = np.random.default_rng(seed)
+    digits = int(random.integers(2, 7))
+    times = sorted({round(float(time), digits) for time in
+                    np.cumsum(random.exponential(10.0**-random.integers(0, 4), 50))})
+    rows = TorqueTable(tuple(times), tuple((n,) for n in range(len(times))), (-1,))
+    dt = rows.tick_for_all(1.0)
+    taken = [n for n, in rows.held(dt)]
+    assert {*taken} - {-1} == {*range(len(times) - 1)}
+    assert dt == 1.0 or dt > 0.59 * min(np.diff(times))
+
+
+def test_columns_can_be_ignored(folder):
+    assert simulate('--out', 'a.csv') == 0
+    header, *rows = GOOD.splitlines()
+    (folder / 'IN.csv').write_text('\n'.join(
+        [f'gear,{header},v,v,', *(f'D,{row},,x,' for row in rows)]))
+    assert simulate('--out', 'b.csv', '--ignore-columns', 'gear, v,') == 0
+    assert (folder / 'a.csv').read_bytes() == (folder / 'b.csv').read_bytes()
+
+
+@pytest.mark.parametrize('message, ignored', [
+    ("IN.csv:1: column 'left': it is needed and cannot be ignored", 'left'),
+    ("IN.csv:1: column 'lift': it is not there to be ignored", 'lift')])
+def test_what_cannot_be_ignored_is_told(folder, capfd, message, ignored):
+    refused(folder, capfd, message, '--ignore-columns', ignored)
+
+
+HINTS = {
+    'it has semicolons, write commas, and decimal points': GOOD.replace(',', ';'),
+    'it has tabs, write commas': GOOD.replace(',', '\t'),
+    'it has spaces, write commas': GOOD.replace(',', '  '),
+    "IN.csv:3: column 'time': '0,5' is not a finite number; write a decimal point, not a comma":
+        GOOD.replace('0.5', '"0,5"'),
+    "IN.csv:2: column 5: '-15' has no header; if commas are its decimal signs, write points":
+        'time,pinion,left,right\n0,0,10,0,-15,0,-16,0\n',
+    "IN.csv:2: column 'time': 's' is not a finite number; if this row has the units, take it out":
+        GOOD.replace('\n', '\ns,N m,N m,N m\n', 1),
+    "IN.csv:2: column 'time': '' is not a finite number; if this row has the units":
+        GOOD.replace('\n', '\n,Nm,Nm,Nm\n', 1),
+    '; --ignore-columns "gear,v" passes over what is unknown':
+        GOOD.replace('pinion', 'gear,pinion,v'),
+    '; --ignore-columns "" passes over': GOOD.replace('right', 'right,'),
+    "column 'Time [ms]': unknown, the columns are time, pinion, left, right; write time for "
+    "'Time [ms]', in s": GOOD.replace('time', 'Time [ms]'),
+    "; write time for 't_s', in s": GOOD.replace('time', 't_s'),
+    "; write left for 'torque.left'": GOOD.replace('left', 'torque.left'),
+    "'12:00:01' is not a finite number; a time is in seconds": GOOD.replace('0.5', '12:00:01'),
+    'if its times are in ms, divide them by 1000':
+        'time,pinion,left,right\n' + ''.join(f'{10 * n},1,2,3\n' for n in range(6000)),
+    'if its times are in ns, divide them by 1e9':
+        'time,pinion,left,right\n' + ''.join(f'{10**7 * n},1,2,3\n' for n in range(60)),
+}
+
+
+@pytest.mark.parametrize('hint', HINTS)
+def test_an_error_has_a_hint_what_the_file_may_be(folder, capfd, hint):
+    (folder / 'IN.csv').write_text(HINTS[hint])
+    assert simulate('--out', 'OUT.csv') == 2
+    err = capfd.readouterr().err
+    assert hint in err and err.startswith('simulate: error: IN.csv:') and err.count('\n') == 1
+    assert not (folder / 'OUT.csv').exists()
+
+
+@pytest.mark.parametrize('times, unit', [
+    (range(0, 1000, 10), 'ms'), (range(0, 4000), 'ms'), (range(0, 100_000, 1000), 'us'),
+    (range(0, 1800), ''), (range(0, 40, 10), '')])
+def test_a_run_whose_times_may_be_in_another_unit_says_so(folder, capfd, times, unit):
+    """A drive cycle has a row each second, for half an hour; four rows may have any times."""
+    write_times(folder, times)
+    assert simulate('--out', 'OUT.csv', '--dt', '1') == 0
+    err = capfd.readouterr().err
+    assert (f'IN.csv: it lasts {times[-1]} s; if its times are in {unit}, divide' in err
+            if unit else err.count('\n') == 1)
 
 
 def test_reads_what_spreadsheets_write(folder):
@@ -311,7 +481,7 @@ def test_a_link_stays_a_link(folder):
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_nothing_behind(folder, number):
-    (folder / 'IN.csv').write_text(GOOD.replace('\n1,', '\n1e6,'))
+    (folder / 'IN.csv').write_text(GOOD.replace('\n1,', '\n5e3,'))
     (folder / 'OUT.csv').write_text('precious')
     before = set(folder.iterdir())
     process = subprocess.Popen(   # a shell's background job, as a test run may be, ignores SIGINT
@@ -332,7 +502,7 @@ def test_an_interrupted_run_leaves_nothing_behind(folder, number):
 
 
 def test_a_reader_that_leaves_ends_it_quietly(folder):
-    (folder / 'IN.csv').write_text(GOOD.replace('\n1,', '\n1e6,'))
+    (folder / 'IN.csv').write_text(GOOD.replace('\n1,', '\n5e3,'))
     process = subprocess.Popen([*TOOL, '--torques', 'IN.csv'], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
     process.stdout.readline()

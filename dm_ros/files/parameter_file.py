@@ -6,10 +6,12 @@ Parameter files as ROS 2 reads them, without ROS, and the text of the default fi
 
 ROS 2 has its own notion of a YAML parameter file: ``1e-3`` is a double (to PyYAML it is a
 string), ``5`` is no double, a name may be nested or dotted. This reader sees what a node
-``/differential`` would see, and refuses what the node would refuse.
+``/differential`` would see, and refuses what the node would refuse; also what ROS 2 lets through
+without a word and nobody can have meant, such as a name given twice.
 """
 
 import re
+import sys
 import textwrap
 
 import yaml
@@ -24,9 +26,14 @@ ROS_PARAMETERS = re.compile(r'use_sim_time|start_type_description_service|qos_ov
 
 BOOLS = {**dict.fromkeys('y Y yes Yes YES true True TRUE on On ON'.split(), True),
          **dict.fromkeys('n N no No NO false False FALSE off Off OFF'.split(), False)}
+# strtol and strtod of C: 010 is 8, 08 is a double, 0x1p3 as well
 INTEGER = re.compile(r'[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)')
 DOUBLE = re.compile(r'[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?')
-NOT_FINITE = re.compile(r'[-+]?\.?(inf|infinity|nan)', re.IGNORECASE)
+HEXADECIMAL = re.compile(r'[-+]?0[xX]([0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]+)'
+                         r'([pP][-+]?[0-9]+)?')
+NOT_FINITE = re.compile(r'[-+]?(?i:inf|infinity|nan)|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)')
+# a key of a section: names of namespaces and of a node, or what stands for any
+SECTION = re.compile(r'/|/?(\*\*?|\w+)(/(\*\*?|\w+))*', re.ASCII)
 
 
 def read_parameter_file(path):
@@ -63,6 +70,9 @@ def _documents(path):
             if isinstance(event, yaml.AliasEvent):   # few of them can stand for billions
                 raise ValueError(f'line {event.start_mark.line + 1}: '
                                  f'ROS 2 knows no YAML aliases such as *{event.anchor}')
+            if getattr(event, 'tag', None):   # it heeds !!str alone and passes over all others
+                raise ValueError(f'line {event.start_mark.line + 1}: '
+                                 'ROS 2 goes by the form of a value, not by its YAML tag')
         return [root for root in yaml.compose_all(text, Loader=yaml.SafeLoader) if root]
     except OSError as error:
         raise ValueError(error.strerror) from None
@@ -83,13 +93,28 @@ def _sections(roots, above=''):
         if not isinstance(root, yaml.MappingNode):
             raise ValueError(f'{above or "the file"}: there is no ros__parameters, a parameter '
                              'file has sections such as "/**: ros__parameters:"')
+        ended = False
         for key, value in root.value:
-            if key.value == 'ros__parameters':
+            name, line = _key(key), key.start_mark.line + 1
+            if ended:
+                raise ValueError(f'{name}: nothing may follow the ros__parameters of a node, '
+                                 f'line {line}')
+            if name == 'ros__parameters':
                 if not above:
                     raise ValueError('ros__parameters: it must be below a node, such as "/**:"')
+                ended = True
                 yield above, value
+            elif SECTION.fullmatch(name):
+                yield from _sections([value], f'{above}/{name}'.replace('//', '/'))
             else:
-                yield from _sections([value], f'{above}/{key.value}'.replace('//', '/'))
+                raise ValueError(f'{name}: it cannot be the name of a node, line {line}')
+
+
+def _key(node):
+    """Return the text of a key."""
+    if not isinstance(node, yaml.ScalarNode) or not node.value:
+        raise ValueError(f'line {node.start_mark.line + 1}: a name is expected before the colon')
+    return node.value
 
 
 def _is_for_node(section):
@@ -105,25 +130,41 @@ def _flat(parameters, above=''):
     if not isinstance(parameters, yaml.MappingNode):
         raise ValueError(f'{above or "ros__parameters"}: '
                          'names with values are expected below it')
-    flat = {}
+    if above and not parameters.value:
+        raise ValueError(f'{above}: there is no name below it')
+    flat, single = {}, set()
     for key, node in parameters.value:
-        name = f'{above}.{key.value}' if above else str(key.value)
+        name = f'{above}.{_key(key)}' if above else _key(key)
         if isinstance(node, yaml.MappingNode):
             below = _flat(node, name)
         elif isinstance(node, yaml.SequenceNode):
-            below = {name: [element.value for element in node.value]}
+            below = {name: _list(name, node)}
         else:
             below = {name: _scalar(name, node)}
-        for twice in flat.keys() & below.keys():
-            raise ValueError(f'{twice}: given twice, also in line {key.start_mark.line + 1}')
+        mine = below.keys() if isinstance(node, yaml.MappingNode) else {name}
+        for twice in sorted(flat.keys() & mine | single & {name}):
+            raise ValueError(f'{twice}: given twice, again in line {key.start_mark.line + 1}; '
+                             'a node would take the last without a word')
+        if not isinstance(node, yaml.MappingNode):
+            single.add(name)
         flat.update(below)
     return flat
+
+
+def _list(name, node):
+    """Return the values of a list; ROS 2 has only those of one type."""
+    if not all(isinstance(element, yaml.ScalarNode) for element in node.value):
+        raise ValueError(f'{name}: a list has single values alone')
+    values = [_scalar(name, element) for element in node.value]
+    if len(set(map(type, values))) > 1:
+        raise ValueError(f'{name}: {values!r} has values of several types')
+    return values
 
 
 def _scalar(name, node):
     """Return the value of a scalar with the type that ROS 2 gives it."""
     text = node.value
-    if node.style:   # quoted
+    if node.style in ('"', "'"):
         return text
     if not text:
         raise ValueError(f'{name}: there is no value')
@@ -133,12 +174,25 @@ def _scalar(name, node):
         digits = text.lstrip('+-')
         base = 16 if digits[:2] in ('0x', '0X') else 8 if digits[0] == '0' else 10
         value = int(text, base)
-        return value if -2**63 <= value < 2**63 else float(value)
-    if DOUBLE.fullmatch(text):
-        return float(text)
+        if -2**63 <= value < 2**63:
+            return value
     if NOT_FINITE.fullmatch(text):
         return float(text.replace('.', ''))
+    if DOUBLE.fullmatch(text) or HEXADECIMAL.fullmatch(text):
+        return _double(text)
     return text
+
+
+def _double(text):
+    """Return a double; what is beyond the range of doubles is a string to ROS 2."""
+    is_hexadecimal = 'x' in text.lower()
+    try:
+        value = float.fromhex(text) if is_hexadecimal else float(text)
+    except OverflowError:
+        return text
+    digits = re.split('[pP]' if is_hexadecimal else '[eE]', text)[0]
+    is_zero = not re.search('[1-9a-fA-F]', digits)
+    return value if is_zero or sys.float_info.min <= abs(value) <= sys.float_info.max else text
 
 
 def _check_type(name, value, kind):

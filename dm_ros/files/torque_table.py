@@ -5,10 +5,14 @@
 
 from bisect import bisect_right
 import csv
+from decimal import Decimal
 import math
 from typing import NamedTuple
 
+from dm_ros.files import table_hints
+
 ON_TIME = 1e-3   # ticks; a time this little after the start of a tick counts as that start
+LATEST_BEGIN = 1000.0   # s; a file that begins later, as at an epoch, begins the run
 
 
 class TorqueTable(NamedTuple):
@@ -17,10 +21,25 @@ class TorqueTable(NamedTuple):
     times: tuple     # s
     torques: tuple   # of tuples: N m, in the order of the inputs, and N, in that of the clutches
     idle: tuple      # likewise, what holds before the first time
+    begin: float = 0.0   # s; what the file calls time 0
 
     def held(self, dt):
         """Return the ``HeldTorques`` for ticks of the length ``dt``, s."""
         return HeldTorques(self, dt)
+
+    def tick_for_all(self, longest):
+        """Return a length of a tick, s, ``longest`` or shorter, in which no row is lost."""
+        gaps = [after - before for before, after in zip(self.times, self.times[1:])]
+        if self.times[-1] / longest > 0.5 and not self.held(longest).never_in_force:
+            return longest
+        gap = min(gaps, default=self.times[-1])
+        # the run may end half a tick before its last time; 0.6 of the gap leave the last row one
+        for share in (1.0, 0.9, 0.8, 0.7, 0.6):
+            for digits in range(1, 17):
+                dt = float(f'{gap * share:.{digits}g}')
+                if abs(dt - gap * share) <= 1e-4 * gap and not self.held(dt).never_in_force:
+                    return dt
+        return gap / 2
 
 
 class HeldTorques:
@@ -41,6 +60,12 @@ class HeldTorques:
         self._starts = [0] + [math.ceil(time / dt - ON_TIME) for time in table.times]
         self._torques = table.idle, *table.torques
         self._ticks = round(end)
+        self._ends = [*(min(start, self._ticks) for start in self._starts[1:]), self._ticks]
+
+    @property
+    def never_in_force(self):
+        """How many rows no tick takes, without the last one, which ends the run."""
+        return sum(start >= end for start, end in zip(self._starts[1:-1], self._ends[1:-1]))
 
     def __len__(self):
         """Return the number of ticks."""
@@ -48,8 +73,7 @@ class HeldTorques:
 
     def __iter__(self):
         """Yield the torques of each tick of the run."""
-        ends = [min(start, self._ticks) for start in self._starts[1:]] + [self._ticks]
-        for start, end, torques in zip(self._starts, ends, self._torques, strict=True):
+        for start, end, torques in zip(self._starts, self._ends, self._torques, strict=True):
             for _ in range(start, end):
                 yield torques
 
@@ -58,60 +82,78 @@ class HeldTorques:
         return self._torques[bisect_right(self._starts, tick) - 1]
 
 
-def read_torque_file(path, ports, clutches=()):
+def read_torque_file(path, ports, clutches=(), ignored=()):
     """
     Return the ``TorqueTable`` of a CSV file.
+
+    A file that begins later than ``LATEST_BEGIN`` has stamps of some clock: its first time is the
+    begin of the run.
 
     :param ports: the ``Port`` s of the shafts; the header is ``time`` and their names, in any
         order, and a cell is in the unit of its port.
     :param clutches: names of columns that may be there too, forces of at least 0; where one of
         them is, they follow the torques in each row of the table, all of them, 0 for the others.
+    :param ignored: names of further columns, whose cells are not read.
     :raises ValueError: one line that names file, line and column.
     """
     try:
         # utf-8-sig: spreadsheets begin the file with a byte order mark
         with open(path, newline='', encoding='utf-8-sig') as file:
-            return _table(path, csv.reader(file, strict=True), ports, clutches)
+            return _table(path, csv.reader(file, strict=True), ports, clutches, ignored)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{path}: not a text file in UTF-8') from None
 
 
-def _table(path, reader, ports, clutches):
+def _table(path, reader, ports, clutches, ignored):
     inputs = [port.name for port in ports]
     try:
         rows = (row for row in reader if any(cell.strip() for cell in row))
-        header = _header(next(rows, ()), inputs, clutches)
-        forces = clutches if set(clutches) & set(header) else ()
-        times, torques = [], []
+        header = _header(next(rows, ()), inputs, clutches, ignored)
+        forces = clutches if set(clutches) & (set(header) - set(ignored)) else ()
+        times, torques, begin = [], [], 0
         for row in rows:
-            cells = _cells(header, row)
+            cells = _cells(header, ignored, row, is_first=not times)
             time = cells['time']
             if time < 0.0:
                 raise ValueError(f"column 'time': {time!r} is negative, a run begins at 0")
+            if not times and time > LATEST_BEGIN:
+                begin = Decimal(row[header.index('time')])
+            if begin:   # exact: the digits of an epoch leave few for what is behind the point
+                time = float(Decimal(row[header.index('time')]) - begin)
             if times and not time > times[-1]:
-                raise ValueError(f"column 'time': {time!r} does not come after {times[-1]!r}")
+                since = f' after {begin} s' if begin else ''
+                raise ValueError(
+                    f"column 'time': {time!r}{since} does not come after {times[-1]!r}{since}")
             times.append(time)
             torques.append((*(cells[name] for name in inputs),
                             *(_force(name, cells.get(name, 0.0)) for name in forces)))
         if not times or times[-1] == 0.0:
-            raise ValueError("column 'time': a row with a time above 0 must end the run")
+            raise ValueError(f"column 'time': a row with a time above {begin} must end the run")
     except (csv.Error, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):
             raise
         raise ValueError(f'{path}:{max(reader.line_num, 1)}: {error}') from None
     idle = *(port.idle for port in ports), *(0.0 for _ in forces)
-    return TorqueTable(tuple(times), tuple(torques), idle)
+    return TorqueTable(tuple(times), tuple(torques), idle, float(begin))
 
 
-def _header(row, inputs, clutches):
+def _header(row, inputs, clutches, ignored):
     names = [cell.strip() for cell in row]
     needed = ('time', *inputs)
     known = ', '.join((*needed, *(f'{name} (if wanted)' for name in clutches)))
+    for name in ignored:
+        if name in needed:
+            raise ValueError(f'column {name!r}: it is needed and cannot be ignored')
+        if name not in names:
+            raise ValueError(f'column {name!r}: it is not there to be ignored')
     for index, name in enumerate(names):
+        if name in ignored:
+            continue
         if name not in (*needed, *clutches):
-            raise ValueError(f'column {name!r}: unknown, the columns are {known}')
+            hint = table_hints.of_header(names, needed, clutches)
+            raise ValueError(f'column {name!r}: unknown, the columns are {known}{hint}')
         if name in names[:index]:
             raise ValueError(f'column {name!r}: it appears twice')
     for name in needed:
@@ -120,12 +162,20 @@ def _header(row, inputs, clutches):
     return names
 
 
-def _cells(header, row):
+def _cells(header, ignored, row, is_first):
     if len(row) < len(header):
         raise ValueError(f'column {header[len(row)]!r}: there is no cell')
     if len(row) > len(header):
-        raise ValueError(f'column {len(header) + 1}: {row[len(header)]!r} has no header')
-    return {name: _number(name, cell) for name, cell in zip(header, row, strict=True)}
+        raise ValueError(f'column {len(header) + 1}: {row[len(header)]!r} has no header'
+                         f'{table_hints.of_cells(row, header)}')
+    cells = {}
+    for name, cell in zip(header, row, strict=True):
+        if name not in ignored:
+            cells[name] = number = _number(cell)
+            if not math.isfinite(number):
+                hint = table_hints.of_number(name, cell, row, is_first)
+                raise ValueError(f'column {name!r}: {cell!r} is not a finite number{hint}')
+    return cells
 
 
 def _force(name, value):
@@ -134,11 +184,8 @@ def _force(name, value):
     return value
 
 
-def _number(name, cell):
+def _number(cell):
     try:
-        number = float(cell) if '_' not in cell else math.nan   # Python reads 1_000
+        return float(cell) if '_' not in cell else math.nan   # Python reads 1_000
     except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise ValueError(f'column {name!r}: {cell!r} is not a finite number')
-    return number
+        return math.nan

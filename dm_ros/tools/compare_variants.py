@@ -25,10 +25,12 @@ from dm_ros.tools.comparison.page import page
 from dm_ros.tools.comparison.runs import (
     BUILT_IN_SECONDS,
     Load,
+    RATES,
     run,
     ticks_of,
 )
 from dm_ros.tools.progress import progress
+from dm_ros.tools.tables import add_ignore_columns, remarks
 
 TABLE_SECONDS = 30.0   # of a CSV, without --duration
 PAGE, LAWS_PAGE = 'index.html', 'laws.html'
@@ -44,8 +46,9 @@ each run. It takes one to two minutes.
 
 IN.csv is that of "simulate": a header "time,<shaft>,..." with the input shafts (symmetric: pinion,
 left, right; lsd: carrier, front, rear), rows of s and N m that hold until the next row's time; the
-last time ends the run. Of FILE, a ROS 2 parameter file, these count: the parameters of the
-mechanism, power_flow_deadband and initial_velocity.
+last time ends the run, and the first one begins it where that is later than 1000 s. Of FILE, a
+ROS 2 parameter file, these count: the parameters of the mechanism, power_flow_deadband and
+initial_velocity.
 """
 
 
@@ -58,6 +61,7 @@ def parser():
     result.add_argument('--torques', metavar='IN.csv',
                         help='torques over time, with --mechanism; default: built-in loads in the '
                         'manner of the figures 3 and 7')
+    add_ignore_columns(result, 'IN.csv')
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
     result.add_argument('--duration', metavar='S', type=float,
                         help=f'length of the load that is run; default: {BUILT_IN_SECONDS:g}, of '
@@ -80,7 +84,9 @@ def loads(arguments):
     if arguments.mechanism is None:
         raise ValueError('--torques needs --mechanism, as its columns are the shafts of one')
     mechanism = MECHANISMS[arguments.mechanism]
-    table = read_torque_file(arguments.torques, mechanism.ports)
+    table = read_torque_file(arguments.torques, mechanism.ports, (), arguments.ignore_columns)
+    for line in remarks(arguments.torques, table, 1 / min(RATES)):
+        print('compare_variants:', line, file=sys.stderr)
     whole = table.times[-1]
     used = min(whole, seconds or TABLE_SECONDS)
     part = '' if used == whole else f', the first {used:g} of {whole:g} s'

@@ -28,10 +28,12 @@ from dm_ros.mechanism.variants import (
 )
 from dm_ros.settings import NodeParameters, port_parameters, speed_ports
 from dm_ros.tools.progress import progress
+from dm_ros.tools.tables import add_ignore_columns, remarks
 
 EPILOG = """\
 CSV is a file as `simulate` reads it: a header "time,<shaft>,..." with every input shaft, and a
-row's torques hold until the time of the next row, those of the last row beyond it. Forces on
+row's torques hold until the time of the next row, those of the last row beyond it. A file that
+begins later than 1000 s, as at an epoch, is played from its first row on. Forces on
 clutches, in columns <clutch>_clutch, are played where CSV has any. Where FILE has a speed port
 (port.<shaft>.kind: speed), the column of its shaft is the speed outside in rad/s. Without
 --duration the last time ends the playing. All goes to the topic <node>/torques, in one message. At
@@ -52,6 +54,7 @@ def parser():
                         help='the same by the variant in the ROS 2 parameter file of the node, '
                         'and which ports take a speed')
     result.add_argument('--torques', metavar='CSV', help='play this file, not the built-in load')
+    add_ignore_columns(result, 'CSV')
     result.add_argument('--rate', type=float, default=100.0, metavar='HZ',
                         help='messages in a second; default: 100')
     result.add_argument('--duration', type=_positive, metavar='S',
@@ -148,7 +151,11 @@ def load(arguments):
     mechanism = equipped(WITH_CLUTCHES[mechanism.name], mechanism.parameters(), speeds)
     ports = mechanism.ports
     if arguments.torques:
-        held = read_torque_file(arguments.torques, ports, mechanism.clutch_moments).held(1 / rate)
+        table = read_torque_file(arguments.torques, ports, mechanism.clutch_moments,
+                                 arguments.ignore_columns)
+        held = table.held(1 / rate)
+        for line in remarks(arguments.torques, table, 1 / rate, lambda dt: f'--rate {1 / dt:.9g}'):
+            print('play_torques:', line, file=sys.stderr, flush=True)
         torques_at, count = held.at, len(held)
         if len(torques_at(0)) > len(ports):
             ports += mechanism.actuators

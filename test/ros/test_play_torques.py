@@ -86,6 +86,19 @@ def test_plays_a_file_to_its_end(ros, play, tmp_path):
     assert last == (0.0, 0.0, 0.0)
 
 
+def test_a_log_is_played_from_its_begin_and_what_it_loses_is_told(tmp_path, capsys):
+    file = tmp_path / 'torques.csv'
+    file.write_text('time,gear,pinion,left,right\n' + ''.join(
+        f'{1748873654 + n / 1000:.3f},D,{n},-1,-1\n' for n in range(101)))
+    arguments = parser().parse_args(['--torques', str(file), '--ignore-columns', 'gear'])
+    _, torques_at, count = load(arguments)
+    assert [torques_at(n)[0] for n in range(count)] == list(range(0, 100, 10))
+    begin, lost = capsys.readouterr().err.splitlines()
+    assert begin.startswith(f'play_torques: {file}: time 0 is 1748873654.0 s in the file')
+    assert lost == (f'play_torques: {file}: 90 of 101 rows are never in force in ticks of '
+                    '0.01 s, --rate 1000 takes all')
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_unloads_and_ends_cleanly(ros, play, number):
     messages = listen(ros)
