@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Measures where the exchange of torques becomes unstable; prints the tables of doc/coupling.md.
+Measures where the exchange of torques becomes unstable; prints tables of doc/coupling.md.
 
 A differential stands with its output shafts against a load that is a function of their speeds,
 as a tyre is, and gets a small push. Torques are exchanged once a tick. The push dies out or it
-grows; a bisection finds where the one turns into the other.
+grows; a bisection finds where the one turns into the other. ``coupling_speed`` does the same where
+speeds are exchanged.
 """
 
 from dataclasses import replace
@@ -176,13 +177,6 @@ def tables():
     for rate in (100.0, 1000.0, 10000.0):
         measured = limit(lambda J, rate=rate: grows(wheel_by_topic(J, rate), rate))
         yield f'| {rate:g} | {slip_inertia(GEAR.I_1):.4g} | {measured:.4g} |'
-    yield from ('', '| rate, Hz | half shaft, N m/rad | c dt/2 | 2 I/dt '
-                '| least and greatest damping, measured |', '|---|---|---|---|---|')
-    for rate, inertia in ((1000.0, 0.0), (1000.0, 0.1), (5000.0, 0.0)):
-        c = 1e4
-        low, high = c / rate / 2, 2 * slip_inertia(GEAR.I_1 + inertia) * rate
-        yield (f'| {rate:g}, {inertia:g} kg m^2 attached | {c:g} | {low:.4g} | {high:.4g} '
-               f'| {damping_range(c, rate, inertia)} |')
     yield from ('', '| tyre, at 1000 Hz and 1 kg m^2 | slope, N m s/rad | push |',
                 '|---|---|---|')
     for slope in (1e3, 1e4, 1e6):
@@ -190,27 +184,12 @@ def tables():
                            ('linearised', linearised(slope, 1.0, 1000.0))):
             yield (f'| {name} | {slope:g} '
                    f'| {"grows" if grows(load, 1000.0, attached(1.0)) else "dies out"} |')
-
-
     parameters = GEAR.changed(OPEN_CAR)
     yield from ('', '| car of the example, rate, Hz | slope at rest over its limit '
                 '| ticks at which the torque turns |', '|---|---|---|')
     for rate in (2000.0, 1000.0, 500.0, 300.0, 200.0, 100.0):
         part = car_slope(CAR) / slope_formula(rate, parameters, (0.0, 1.0))
         yield f'| {rate:g} | {part:.2f} | {100 * chatter(rate):.0f} % |'
-
-
-def damping_range(stiffness, rate, inertia):
-    """Return the measured range of stable damping in words, N m s/rad."""
-    def unstable(damping):
-        return grows(half_shaft(stiffness, damping), rate, attached(inertia))
-    low, high = stiffness / rate / 2, 2 * slip_inertia(GEAR.I_1 + inertia) * rate
-    if low >= high:
-        stable = [d for d in (low * 1.1**n for n in range(-80, 80)) if not unstable(d)]
-        return 'none' if not stable else f'{stable[0]:.4g} to {stable[-1]:.4g}'
-    middle = (low * high)**0.5
-    least = 1.0 / limit(lambda inverse: unstable(1.0 / inverse), 1.0 / middle, 1e3 / middle)
-    return f'{least:.4g} to {limit(unstable, middle, middle * 1e4):.4g}'
 
 
 def car_slope(p):
