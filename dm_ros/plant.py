@@ -160,10 +160,11 @@ class Plant:
         :raises ValueError: names the parameter, its value and what is allowed.
         """
         rows = {name: row for table in self._tables for name, row in table.rows().values()}
-        for name in changes:
+        before = self.values
+        for name, value in changes.items():
             if name not in rows:
                 raise ValueError(f'{name}: there is no such parameter')
-            if rows[name].read_only:
+            if rows[name].read_only and value != before[name]:
                 raise ValueError(f'{name}: it cannot be changed while it runs')
         settings = self.settings.changed(self.settings.part_of(changes))
         mechanism = self.simulation.parameters.part_of(changes)

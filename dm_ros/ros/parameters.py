@@ -3,11 +3,15 @@
 
 """The tables of parameters as ROS 2 parameters: declared, described, checked."""
 
+import re
+
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
 from dm_ros.mechanism.variants import PORT_TABLES, variant_named
 from dm_ros.ros.privates import given_parameters
 from dm_ros.settings import known_rows, NodeParameters
+
+WITH_EXPONENT = re.compile(r'[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+')
 
 
 def descriptor(entry):
@@ -57,6 +61,14 @@ def declare(node, table, given, not_mine=()):
 
 
 def strictly_checked(name, value):
-    """Check a value for a parameter, with the types of ROS 2; raise ValueError as ``declare``."""
-    if name in known_rows():
-        known_rows()[name].strictly_checked(name, value)
+    """
+    Return a value for a parameter, checked with the types of ROS 2; raise as ``declare`` does.
+
+    ``ros2 param`` makes a string of ``4e-05``, which a parameter file takes as a double.
+    """
+    if name not in known_rows():
+        return value
+    entry = known_rows()[name]
+    if entry.kind is float and isinstance(value, str) and WITH_EXPONENT.fullmatch(value):
+        value = float(value)
+    return entry.strictly_checked(name, value)

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -17,10 +19,16 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 import rclpy
-from rclpy.parameter import Parameter
+from rclpy.parameter import (
+    get_parameter_value,
+    Parameter,
+    parameter_dict_from_yaml_file,
+    parameter_value_to_python,
+)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int8
 from std_srvs.srv import SetBool, Trigger
+import yaml
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
@@ -205,6 +213,74 @@ def test_a_request_with_one_impossible_parameter_changes_nothing(ros, service, b
     assert (values[0].double_value, values[1].integer_value) == (100.0, 1)
     assert node.simulation.parameters == before
     assert node.simulation.substeps == 1
+
+
+def dump_and_load(ros, path):
+    """Write a file as ``ros2 param dump`` does; return what ``ros2 param load`` makes of it."""
+    names = ros.call(ListParameters, '/differential/list_parameters').result.names
+    values = ros.call(GetParameters, '/differential/get_parameters', names=names).values
+    tree = {}
+    for name, value in zip(names, values, strict=True):
+        *groups, leaf = name.split('.')
+        branch = tree
+        for group in groups:
+            branch = branch.setdefault(group, {})
+        branch[leaf] = parameter_value_to_python(value)
+    path.write_text(yaml.dump({'/differential': {'ros__parameters': tree}}))
+    return list(parameter_dict_from_yaml_file(str(path)).values())
+
+
+@pytest.mark.parametrize('service', ['set_parameters', 'set_parameters_atomically'])
+@pytest.mark.parametrize('variant, more', [
+    ('symmetric_ode', {}), ('lsd_ode', {'port__rear__kind': 'speed'}),
+    ('symmetric_dae', {'use_sim_time': True})])
+def test_loading_its_own_dump_succeeds_and_changes_nothing(ros, tmp_path, service, variant, more):
+    node = ros.differential(variant, **more)
+    before = node.plant.values
+    loaded = dump_and_load(ros, tmp_path / 'dump.yaml')
+    kind = SetParameters if service == 'set_parameters' else SetParametersAtomically
+    response = ros.call(kind, f'/differential/{service}', parameters=loaded)
+    results = response.results if service == 'set_parameters' else [response.result]
+    assert {result.reason for result in results} == {''}
+    assert all(result.successful for result in results)
+    assert len(results) == (len(loaded) if service == 'set_parameters' else 1)
+    assert node.plant.values == before
+
+
+@pytest.mark.parametrize('service', ['set_parameters', 'set_parameters_atomically'])
+@pytest.mark.parametrize('same, other', [
+    ({'rate': 200.0}, {'rate': 100.0}), ({'variant': 'lsd_ode'}, {'variant': 'lsd_dae'}),
+    ({'energy_audit': True}, {'energy_audit': False}),
+    ({'realtime_priority': 0}, {'realtime_priority': False}),
+    ({'start_type_description_service': True}, {'start_type_description_service': False})])
+def test_a_read_only_parameter_may_be_set_to_the_value_it_has_alone_or_in_a_set(
+        ros, service, same, other):
+    node = ros.differential('lsd_ode')
+    kind = SetParameters if service == 'set_parameters' else SetParametersAtomically
+
+    def succeeds(**parameters):
+        response = ros.call(kind, f'/differential/{service}', parameters=as_messages(**parameters))
+        results = response.results if service == 'set_parameters' else [response.result]
+        succeeded, = {result.successful for result in results}
+        return succeeded
+    assert succeeds(**same)
+    assert succeeds(substeps=2, **same) and node.simulation.substeps == 2
+    assert not succeeds(substeps=3, **other) and node.simulation.substeps == 2
+    assert not succeeds(**other)
+
+
+def test_a_number_with_an_exponent_of_which_ros2_param_makes_a_string_is_a_double(ros):
+    node = ros.differential()
+
+    def succeeds(text):
+        value = get_parameter_value(text)
+        result, = ros.call(SetParameters, '/differential/set_parameters', parameters=[
+            ParameterMessage(name='symmetric.inertia.satellite', value=value)]).results
+        return result.successful
+    assert get_parameter_value('5e-05').type == ParameterType.PARAMETER_STRING
+    assert succeeds('5e-05') and node.simulation.parameters.I_s == 5e-5
+    assert not succeeds('1e300') and not succeeds('5') and not succeeds('five')
+    assert node.simulation.parameters.I_s == 5e-5
 
 
 def test_parameters_that_are_only_possible_together_are_taken_together(ros):

@@ -47,6 +47,28 @@ def test_a_preset_loads_with_its_variant(ros, preset, words):
         assert words in process.errors
 
 
+@pytest.mark.parametrize('parameters, words', [
+    ('rate: 100', ['rate: 100 ', 'a double']),
+    ('symmetric.inertia.left: 1', ['symmetric.inertia.left: 1 ', 'a double']),
+    ('symmetric: {clutch: {left: {preload: 50}}}', ['symmetric.clutch.left.preload: 50 ']),
+    ('substeps: 2.0', ['substeps: 2.0 ', 'an integer']),
+    ('energy_audit: 1', ['energy_audit: 1 ', 'a boolean']),
+    ('variant: 1', ['variant: 1 ', 'lsd_ode']),
+    ('rate: [100.0]', ['rate: ', 'a double']),
+    ('use_sim_time: 1', ['use_sim_time', 'BOOL']),
+    ('start_type_description_service: 1', ['start_type_description_service', 'BOOL'])])
+def test_a_value_of_another_type_in_a_file_as_launch_writes_it_ends_it_with_code_2_and_one_line(
+        ros, tmp_path, parameters, words):
+    file = tmp_path / 'launch_params'
+    file.write_text(f'/**:\n  ros__parameters:\n    {parameters}\n')
+    with start('--ros-args', '-r', '__node:=rear', '-r', '__ns:=/car', '--params-file',
+               file) as process:
+        assert process.ended() == 2
+        line, = process.errors.strip().splitlines()
+    assert line.startswith('differential: error: ')
+    assert all(word in line for word in words), line
+
+
 @pytest.mark.parametrize('parameter, words', [
     ('symmetric.efficiency.left_mesh:=1.5', ['symmetric.efficiency.left_mesh', '1.5', '(0, 1]']),
     ('symmetric.satellite_count:=0', ['symmetric.satellite_count', '0']),
