@@ -74,6 +74,31 @@ def known_rows():
             for table in tables() for name, entry in table.rows().values()}
 
 
+def names_for(mechanism):
+    """Return the full names of all parameters that a run of a ``Mechanism`` has."""
+    of_others = {f'initial_velocity.{shaft}' for other in MECHANISMS.values()
+                 for shaft in other.outputs if shaft not in mechanism.outputs}
+    return [name for table in (NodeParameters, mechanism.parameters,
+                               *(PORT_TABLES[shaft] for shaft in mechanism.inputs))
+            for name, _ in table.rows().values() if name not in of_others]
+
+
+def passed_over(values, *mechanisms):
+    """
+    Return in one line what of the values belongs to other mechanisms alone, None without any.
+
+    :param values: ``{full name: value}``, also with names of no mechanism, such as those that
+        every ROS 2 node has; mechanisms: those that run.
+    """
+    counting = {name for mechanism in mechanisms for name in names_for(mechanism)}
+    names = [name for name in values if name in known_rows() and name not in counting]
+    if not names:
+        return None
+    return (f'{len(names)} parameter{"s" if len(names) > 1 else ""} of another mechanism than the '
+            f'{" and the ".join(mechanism.title for mechanism in mechanisms)} '
+            f'count{"" if len(names) > 1 else "s"} for nothing: {", ".join(names)}')
+
+
 def port_parameters(inputs, values):
     """Return ``{shaft: PortParameters}`` of some input shafts, from values by full name."""
     return {shaft: PORT_TABLES[shaft]().changed(PORT_TABLES[shaft].part_of(values))

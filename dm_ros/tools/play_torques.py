@@ -27,6 +27,7 @@ from dm_ros.mechanism.variants import (
     WITH_CLUTCHES,
 )
 from dm_ros.settings import port_parameters, speed_ports
+from dm_ros.tools.passed_over import warn
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
@@ -144,6 +145,7 @@ def load(arguments):
     values = read_parameter_file(arguments.params) if arguments.params else {}
     mechanism = (MECHANISMS[arguments.profile] if arguments.profile
                  else variant_named(values.get('variant', arguments.variant)).mechanism)
+    warn('play_torques', arguments.params, values, mechanism)
     speeds = speed_ports(port_parameters(mechanism.inputs, values))
     mechanism = equipped(WITH_CLUTCHES[mechanism.name], mechanism.parameters(), speeds)
     ports = mechanism.ports

@@ -23,6 +23,7 @@ from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.motion.simulation import NO_FORCE
 from dm_ros.settings import make_simulation, NodeParameters
+from dm_ros.tools.passed_over import warn
 from dm_ros.tools.progress import progress
 
 EPILOG = """\
@@ -94,6 +95,7 @@ def run(arguments):
         raise ValueError('--variant: it is needed where no FILE has the parameter variant')
     simulation = make_simulation(variant, values, arguments.dt)
     mechanism = simulation.mechanism
+    warn('simulate', arguments.params, values, mechanism)
     table = read_torque_file(arguments.torques, mechanism.ports, mechanism.clutch_moments)
     try:
         torques = table.held(simulation.dt)

@@ -53,6 +53,16 @@ def test_plays_a_built_in_load_and_ends_with_zero(ros, play, arguments, profile,
     assert list(last.effort) == [0.0, 0.0, 0.0]
 
 
+def test_warns_of_a_file_for_another_node_and_of_one_for_the_other_mechanism(play, tmp_path):
+    file = tmp_path / 'node.yaml'
+    file.write_text('/other: {ros__parameters: {variant: lsd_ode}}')
+    options = '--wait', 0, '--duration', 0.1, '--params'
+    other, lsd = play(*options, file), play(*options, PRESETS.parent / 'lsd.yaml')
+    assert other.ended() == lsd.ended() == 0
+    assert f'warning: {file}: nothing in it is for /differential, but for /other' in other.errors
+    assert 'play_torques: warning: 33 parameters of another mechanism' in lsd.errors
+
+
 def test_plays_forces_where_the_file_has_any_and_ends_with_open_clutches(ros, play, tmp_path):
     file = tmp_path / 'torques.csv'
     file.write_text('time,carrier,front,rear,rear_clutch\n0,30,-10,-15,500\n0.4,0,0,0,0\n')
