@@ -74,7 +74,8 @@ class Plant:
             kind=AuditedSimulation if settings.energy_audit else Simulation)
         mechanism = self.simulation.mechanism
         self.ports = port_parameters(mechanism.inputs, values)
-        self.inputs = HeldInputs(mechanism.ports + mechanism.actuators, (), 0.0)
+        self.inputs = HeldInputs(mechanism.ports + mechanism.actuators, (), 0.0,
+                                 settings.joint_prefix)
         self._shafts = len(mechanism.ports)
         self.ticks = 0   # in all, also refused ones and those before a reset
         self.refusing = Condition('messages are refused', log)

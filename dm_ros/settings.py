@@ -10,6 +10,9 @@ from dm_ros.mechanism.variants import MECHANISMS, PORT_TABLES, variant_named, VA
 from dm_ros.motion.models import LOSS_LAWS, PASSIVE
 from dm_ros.motion.simulation import Simulation
 
+PREFIX = (r'([A-Za-z][A-Za-z0-9_/.-]*)?',
+          'nothing, or a letter and then letters, digits and any of _ / . -')
+
 
 def initial_velocity(shaft):
     return row(f'initial_velocity.{shaft}', 0.0, 'rad/s', -1e6, 1e6,
@@ -45,6 +48,9 @@ class NodeParameters(Parameters):
                                   above_low=True)
     publish_clock: bool = row('publish_clock', False, '', 0, 0,
                               'drive /clock with simulated time', kind=bool, read_only=True)
+    joint_prefix: str = row('joint_prefix', '', '', 0, 0,
+                            'before every name in JointState messages, in and out', kind=str,
+                            read_only=True, pattern=PREFIX)
     energy_audit: bool = row('energy_audit', True, '', 0, 0,
                              'keep the energy balance, for /diagnostics', kind=bool,
                              read_only=True)

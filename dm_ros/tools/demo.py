@@ -117,7 +117,8 @@ def run_processes(arguments, simulation, values):
         with process('ros.command', *parameters) as node:
             wait(recorder.poll, 'state of the differential', node)
             with process('tools.play_torques', '--variant', simulation.variant,
-                         '--node', f'{namespace}/differential') as player:
+                         '--joint-prefix', values.get('joint_prefix', ''),
+                         '--ros-args', '-r', f'__ns:={namespace}') as player:
                 wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft',
                      node, player)
                 wait(next_report(recorder), 'report of the differential', node, player)

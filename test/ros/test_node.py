@@ -413,6 +413,72 @@ def test_several_differentials_live_in_their_namespaces(ros):
     assert (len(front[0].name), len(centre[0].name)) == (5, 4)
 
 
+def test_diagnostics_of_several_differentials_are_told_apart_by_their_full_names(ros):
+    ros.differential(arguments=['--ros-args', '-r', '__ns:=/car/front'])
+    ros.differential('lsd_ode', arguments=['--ros-args', '-r', '__ns:=/car/rear'])
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    names = ['/car/front/differential', '/car/rear/differential']
+    parts = ['loop', 'torques', 'connections', 'energy']
+
+    def heard():
+        return {(status.hardware_id, status.name)
+                for message in diagnostics for status in message.status}
+    ros.until(lambda: len(heard()) >= 8)
+    assert heard() == {(name, f'{name}: {part}') for name in names for part in parts}
+
+
+def prefixed(names, prefix='rear_'):
+    return [prefix + name for name in names]
+
+
+@pytest.mark.parametrize('variant, more', [
+    ('lsd_ode', {}), ('symmetric_ode', {'symmetric__clutch__left__friction_surfaces': 4}),
+    ('lsd_dae', {'port__rear__kind': 'speed'})])
+def test_a_joint_prefix_is_before_every_name_that_goes_out(ros, variant, more):
+    node = ros.differential(variant, joint_prefix='rear_', **more)
+    mechanism = node.simulation.mechanism
+    heard = {topic: ros.listen(JointState, f'/differential/{topic}')
+             for topic in ('joint_states', 'internal_moments', 'clutches')}
+    ros.until(lambda: all(heard.values()))
+    names = {topic: messages[-1].name for topic, messages in heard.items()}
+    assert names == {'joint_states': prefixed(mechanism.shafts),
+                     'internal_moments': prefixed(mechanism.moments),
+                     'clutches': prefixed(mechanism.clutch_moments)}
+
+
+@pytest.mark.parametrize('prefix', ['rear_', 'axle2/', 'L.'])
+def test_a_joint_prefix_is_before_every_name_that_comes_in_but_in_no_topic(ros, prefix):
+    node = ros.differential('lsd_ode', joint_prefix=prefix, torque_timeout=0.0,
+                            port__rear__kind='speed', rate=50.0)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    torques = ros.publisher(JointState, '/differential/torques')
+
+    def publish(names):
+        torques.publish(JointState(name=names, effort=[3.0, math.nan, 40.0],
+                                   velocity=[math.nan, 0.5, math.nan]))
+    names = ['carrier', 'rear', 'rear_clutch']
+    publish(names)
+    ros.until(lambda: diagnostics and keys(diagnostics, 'torques')[0]['refused messages'] == '1')
+    assert keys(diagnostics, 'torques')[0]['last refused'].startswith(
+        f"~/torques: 'carrier' is not one of {prefix}carrier, {prefix}front, ")
+    publish(prefixed(names, prefix))
+    ros.until(lambda: node.plant.inputs.in_force(0) == (3.0, 0.0, 0.5, 0.0, 40.0))
+    ros.publisher(Float64, '/differential/torque/front').publish(Float64(data=2.0))
+    ros.publisher(Float64, '/differential/clutch/front').publish(Float64(data=7.0))
+    ros.until(lambda: node.plant.inputs.in_force(0) == (3.0, 2.0, 0.5, 7.0, 40.0))
+
+
+def test_in_lockstep_names_have_the_joint_prefix_too(ros):
+    node = ros.differential('lsd_ode', mode='lockstep', joint_prefix='rear_')
+    joints = ros.listen(JointState, '/differential/joint_states')
+    torques = ros.publisher(JointState, '/differential/torques')
+    torques.publish(JointState(name=['carrier'], effort=[1.0]))
+    torques.publish(JointState(name=['rear_carrier'], effort=[2.0]))
+    ros.until(lambda: joints)
+    assert (node.plant.inputs.refused, node.simulation.ticks) == (1, 1)
+    assert joints[0].effort[joints[0].name.index('rear_carrier')] == 2.0
+
+
 @pytest.mark.parametrize('name, table', [
     ('symmetric.yaml', SymmetricParameters), ('lsd.yaml', SelfLockingParameters)])
 def test_ros_reads_the_default_files_as_the_defaults(ros, name, table):

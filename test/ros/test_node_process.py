@@ -114,6 +114,7 @@ def test_a_value_of_another_type_in_a_file_as_launch_writes_it_ends_it_with_code
     ('rate:=100', ['rate', '100', 'double']),
     ('variant:=torsen', ['variant', 'torsen', 'lsd_ode']),
     ('loss_law:=torsen', ['loss_law', 'torsen', 'passive, paper']),
+    ('joint_prefix:=2rear', ['joint_prefix', '2rear', 'letter']),
     ('symmetric.inertia.wheel:=1.0', ['symmetric.inertia.wheel']),
 ])
 def test_an_unknown_or_impossible_parameter_ends_it_with_code_2_and_one_line(

@@ -83,7 +83,7 @@ def test_plays_a_file_to_its_end(ros, play, tmp_path):
     file.write_text('right,time,left,pinion\n' + ''.join(
         f'{right},{n / 50},{left},{pinion}\n' for n, (pinion, left, right) in enumerate(rows)))
     arguments = ['--torques', str(file), '--wait', '60']
-    _, torques_at, count = load(parser().parse_args(arguments))
+    _, torques_at, count, _ = load(parser().parse_args(arguments))
     assert [torques_at(n) for n in range(count)] == [row for row in rows[:-1] for _ in range(2)]
     messages = listen(ros)
     process = play(*arguments)
@@ -107,11 +107,35 @@ def test_a_signal_unloads_and_ends_cleanly(ros, play, number):
 
 @pytest.mark.parametrize('arguments', [
     ['--node', '/my/axle'],
+    ['--node', 'axle', '--ros-args', '-r', '__ns:=/my'],
+    ['--ros-args', '-r', '__ns:=/my', '-r', 'differential/torques:=/my/axle/torques'],
     ['--ros-args', '-r', '/differential/torques:=/my/axle/torques']])
 def test_the_topic_can_be_chosen(ros, play, arguments):
     messages = listen(ros, '/my/axle/torques')
     play('--wait', 60, *arguments)
     ros.until(lambda: len(messages) > 1)
+
+
+def test_in_a_namespace_it_drives_the_differential_of_that_namespace(ros, play):
+    there = [ros.differential(arguments=['--ros-args', '-r', f'__ns:=/{name}'])
+             for name in ('front', 'rear')]
+    states = listen(ros, '/rear/differential/joint_states')
+    play('--wait', 60, '--ros-args', '-r', '__ns:=/rear')
+    ros.until(lambda: states and abs(states[-1].velocity[states[-1].name.index('left')]) > 1.0)
+    assert [node.plant.inputs.received > 0 for node in there] == [False, True]
+
+
+@pytest.mark.parametrize('by_file', [False, True])
+def test_plays_to_a_node_with_a_joint_prefix(ros, play, tmp_path, by_file):
+    node = ros.differential('lsd_ode', joint_prefix='rear_',
+                            arguments=['--ros-args', '-r', '__ns:=/car'])
+    file = tmp_path / 'node.yaml'
+    file.write_text('/car/differential: {ros__parameters: '
+                    '{joint_prefix: rear_, variant: lsd_ode}}')
+    process = play('--wait', 60, '--ros-args', '-r', '__ns:=/car', '--', *(
+        ['--params', file] if by_file else ['--variant', 'lsd_ode', '--joint-prefix', 'rear_']))
+    ros.until(lambda: node.plant.inputs.received > 10)
+    assert node.plant.inputs.refused == 0 and 'warning' not in process.errors
 
 
 def test_without_a_subscriber_it_warns_and_plays_all_the_same(ros, play):
@@ -134,6 +158,7 @@ def test_drives_the_node(ros, play):
     (['--duration', 'nan'], '--duration: nan must be in'),
     (['--profile', 'lsd', '--variant', 'lsd_ode'], 'not allowed with'),
     (['--params', 'missing.yaml'], 'missing.yaml: No such file'),
+    (['--joint-prefix', ' '], "joint_prefix: ' ' is not allowed"),
     (['--what'], 'unrecognized arguments'),
     (['--ros-args', '-r', 'what'], "remap rule: '-r what'"),
     (['--ros-args', '--what'], '--what')])
