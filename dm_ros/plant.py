@@ -87,7 +87,8 @@ class Plant:
             kind=AuditedSimulation if settings.energy_audit else Simulation)
         mechanism = self.simulation.mechanism
         self.ports = port_parameters(mechanism.inputs, values)
-        self.inputs = HeldInputs(mechanism.ports + mechanism.actuators, (), 0.0)
+        self.inputs = HeldInputs(mechanism.ports + mechanism.actuators, (), 0.0,
+                                 settings.joint_prefix)
         self._shafts = len(mechanism.ports)
         self.ticks = 0   # in all, also refused ones and those before a reset
         self.refusing = Condition('messages are refused', log)
@@ -173,10 +174,11 @@ class Plant:
         :raises ValueError: names the parameter, its value and what is allowed.
         """
         rows = {name: row for table in self._tables for name, row in table.rows().values()}
-        for name in changes:
+        before = self.values
+        for name, value in changes.items():
             if name not in rows:
                 raise ValueError(f'{name}: there is no such parameter')
-            if rows[name].read_only:
+            if rows[name].read_only and value != before[name]:
                 raise ValueError(f'{name}: it cannot be changed while it runs')
         settings = self.settings.changed(self.settings.part_of(changes))
         mechanism = self.simulation.parameters.part_of(changes)

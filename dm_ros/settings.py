@@ -10,6 +10,9 @@ from dm_ros.mechanism.variants import MECHANISMS, PORT_TABLES, variant_named, VA
 from dm_ros.motion.models import LOSS_LAWS, PASSIVE
 from dm_ros.motion.simulation import Simulation
 
+PREFIX = (r'([A-Za-z][A-Za-z0-9_/.-]*)?',
+          'nothing, or a letter and then letters, digits and any of _ / . -')
+
 
 def initial_velocity(shaft):
     return row(f'initial_velocity.{shaft}', 0.0, 'rad/s', -1e6, 1e6,
@@ -45,6 +48,9 @@ class NodeParameters(Parameters):
                                   above_low=True)
     publish_clock: bool = row('publish_clock', False, '', 0, 0,
                               'drive /clock with simulated time', kind=bool, read_only=True)
+    joint_prefix: str = row('joint_prefix', '', '', 0, 0,
+                            'before every name in JointState messages, in and out', kind=str,
+                            read_only=True, pattern=PREFIX)
     energy_audit: bool = row('energy_audit', True, '', 0, 0,
                              'keep the energy balance, for /diagnostics', kind=bool,
                              read_only=True)
@@ -72,6 +78,31 @@ def known_rows():
     """Return ``{full name: Row}`` of every parameter there is."""
     return {name: entry
             for table in tables() for name, entry in table.rows().values()}
+
+
+def names_for(mechanism):
+    """Return the full names of all parameters that a run of a ``Mechanism`` has."""
+    of_others = {f'initial_velocity.{shaft}' for other in MECHANISMS.values()
+                 for shaft in other.outputs if shaft not in mechanism.outputs}
+    return [name for table in (NodeParameters, mechanism.parameters,
+                               *(PORT_TABLES[shaft] for shaft in mechanism.inputs))
+            for name, _ in table.rows().values() if name not in of_others]
+
+
+def passed_over(values, *mechanisms):
+    """
+    Return in one line what of the values belongs to other mechanisms alone, None without any.
+
+    :param values: ``{full name: value}``, also with names of no mechanism, such as those that
+        every ROS 2 node has; mechanisms: those that run.
+    """
+    counting = {name for mechanism in mechanisms for name in names_for(mechanism)}
+    names = [name for name in values if name in known_rows() and name not in counting]
+    if not names:
+        return None
+    return (f'{len(names)} parameter{"s" if len(names) > 1 else ""} of another mechanism than the '
+            f'{" and the ".join(mechanism.title for mechanism in mechanisms)} '
+            f'count{"" if len(names) > 1 else "s"} for nothing: {", ".join(names)}')
 
 
 def port_parameters(inputs, values):

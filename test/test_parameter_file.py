@@ -181,7 +181,7 @@ def test_an_unreadable_file_is_named(tmp_path, name):
 
 def test_every_parameter_of_the_node_can_stand_in_a_file(read):
     def text(value):
-        return str(value).lower() if isinstance(value, bool) else str(value)
+        return str(value).lower() if isinstance(value, bool) else str(value) or "''"
     named = NodeParameters().named()
     lines = [f'    {name}: {text(value)}' for name, value in named.items()]
     assert read('/**:\n  ros__parameters:\n' + '\n'.join(lines)) == named

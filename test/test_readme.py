@@ -33,7 +33,7 @@ def parameter_table():
                   SelfLockingParameters()):
         for symbol, (name, entry) in table.rows().items():
             value = getattr(table, symbol)
-            default = f'{value:.10g}' if entry.kind is float else f'{value}'
+            default = f'{value:.10g}' if entry.kind is float else f'{value}' or "''"
             if entry.kind is float and not re.search(r'[.e]', default):
                 default += '.0'
             allowed = entry.allowed.removeprefix('in ')

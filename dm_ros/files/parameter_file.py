@@ -36,9 +36,9 @@ NOT_FINITE = re.compile(r'[-+]?(?i:inf|infinity|nan)|[-+]?\.(inf|Inf|INF)|\.(nan
 SECTION = re.compile(r'/|/?(\*\*?|\w+)(/(\*\*?|\w+))*', re.ASCII)
 
 
-def read_parameter_file(path):
+def read_parameter_file(path, node=NODE):
     """
-    Return the parameters that a file gives to a node ``/differential``.
+    Return the parameters that a file gives to a node ``/differential``, or of another full name.
 
     :return: ``{full name: value}``, only those in the file.
     :raises ValueError: one line, ``file: name: what``, for a file that cannot be read, an
@@ -47,7 +47,7 @@ def read_parameter_file(path):
     try:
         values = {}
         for name_of_node, parameters in _sections(_documents(path)):
-            if _is_for_node(name_of_node):
+            if is_for_node(name_of_node, node):
                 values.update(_flat(parameters))
         for table in tables():
             mine = table.part_of(values)
@@ -59,6 +59,14 @@ def read_parameter_file(path):
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
     return values
+
+
+def missing(path, node=NODE):
+    """Return in one line that a file is for other nodes alone, None where it is not."""
+    names = [name for name, _ in _sections(_documents(path))]
+    if not names or any(is_for_node(name, node) for name in names):
+        return None
+    return f'{path}: nothing in it is for {node}, but for {", ".join(names)}'
 
 
 def _documents(path):
@@ -117,12 +125,12 @@ def _key(node):
     return node.value
 
 
-def _is_for_node(section):
-    """Return whether ROS 2 applies a section to ``NODE``: ** is any namespaces, * is one."""
+def is_for_node(section, node):
+    """Return whether ROS 2 applies a section to a node: ** is any namespaces, * is one."""
     words = {'**': r'(/\w+)*', '*': r'/\w+'}
     pattern = ''.join(words.get(token, '/' + re.escape(token))
                       for token in section.split('/') if token)
-    return re.fullmatch(pattern, NODE) is not None
+    return re.fullmatch(pattern, node) is not None
 
 
 def _flat(parameters, above=''):

@@ -14,6 +14,7 @@ All quantities are SI: rad, rad/s, N m, kg m^2, N m s/rad.
 
 from dataclasses import dataclass, field, fields
 import math
+import re
 from typing import NamedTuple
 
 ASSUMED = 'assumed: the paper gives no value'
@@ -30,13 +31,14 @@ class Row(NamedTuple):
     kind: type = float
     above_low: bool = False   # the low end itself is not allowed
     choices: tuple = ()       # of a str
+    pattern: tuple = ()       # of a str without choices: a regular expression, and it in words
     read_only: bool = False   # of the node: not to be changed while it runs
 
     @property
     def allowed(self):
         """Return what is allowed in words, such as ``in (0, 1]``."""
         if self.kind is str:
-            return f'one of {", ".join(self.choices)}'
+            return self.pattern[1] if self.pattern else f'one of {", ".join(self.choices)}'
         if self.kind is bool:
             return 'true or false'
         number = 'an integer in ' if self.kind is int else 'in '
@@ -59,6 +61,8 @@ class Row(NamedTuple):
 
     def _fits(self, value):
         if self.kind is str:
+            if self.pattern:
+                return isinstance(value, str) and re.fullmatch(self.pattern[0], value) is not None
             return value in self.choices
         if self.kind is bool or isinstance(value, (bool, str)):
             return type(value) is self.kind

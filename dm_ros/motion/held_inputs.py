@@ -22,13 +22,14 @@ class HeldInputs:
     a paused mechanism does not lose its inputs.
     """
 
-    def __init__(self, ports, limits, timeout):
+    def __init__(self, ports, limits, timeout, prefix=''):
         """
         Start without any demand.
 
         :param ports: the ``Port`` s of a mechanism; the inputs in force follow their order.
         :param limits: of each port, larger demands are clamped to it, in the unit of the port.
         :param timeout: ticks, an older demand counts as zero; 0 for never.
+        :param prefix: before the names that come with ``Joints``.
         """
         self.ports = ports
         self.names = tuple(port.name for port in ports)
@@ -36,6 +37,7 @@ class HeldInputs:
         self.timeout = timeout
         self.received = self.refused = self.clamped = 0
         self._index = {name: i for i, name in enumerate(self.names)}
+        self._prefixed = {prefix + name: name for name in self.names} if prefix else None
         self._speeds = {port.name for port in ports if port.kind == 'speed'}
         self.forget()
 
@@ -79,6 +81,12 @@ class HeldInputs:
         """Return the names of the ports that never had a demand."""
         return [name for name, arrival in zip(self.names, self._arrival) if arrival is None]
 
+    def _without_prefix(self, names):
+        for name in names:
+            if name not in self._prefixed:
+                raise ValueError(f'{name!r} is not one of {", ".join(self._prefixed)}')
+        return [self._prefixed[name] for name in names]
+
     def _of_kinds(self, names, efforts, velocities):
         """Return one value for each name, the one that its port takes."""
         for name in names:
@@ -100,6 +108,8 @@ class HeldInputs:
 
     def _take(self, names, values, tick, sparse):
         if isinstance(values, Joints):
+            if self._prefixed:
+                names = self._without_prefix(names)
             values = (self._of_kinds(names, *values) if self._speeds else values.efforts)
         if len(names) != len(values):
             raise ValueError(f'{len(names)} names but {len(values)} values')

@@ -12,18 +12,20 @@ from dm_ros.motion.energy import AuditedSimulation, rated_efficiency
 from dm_ros.plant import Condition
 
 
-def status(name, complaints, fine, values):
+def status(node, part, complaints, fine, values):
     """
     Return a DiagnosticStatus.
 
+    :param node: full name of the node, by which several differentials are told apart.
+    :param part: which part of it the status is of.
     :param complaints: what is wrong, in words, if anything; fine: the message if nothing is.
     :param values: mapping from key to value.
     """
     return DiagnosticStatus(
         level=DiagnosticStatus.WARN if complaints else DiagnosticStatus.OK,
-        name=name,
+        name=f'{node}: {part}',
         message='; '.join(complaints) or fine,
-        hardware_id='dm_ros',
+        hardware_id=node,
         values=[KeyValue(key=key, value=str(value)) for key, value in values.items()])
 
 
@@ -61,7 +63,7 @@ class Diagnostics:
         return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
 
     def _status(self, part, complaints, fine, values):
-        return status(f'{self._node.get_name()}: {part}', complaints, fine, values)
+        return status(self._node.get_fully_qualified_name(), part, complaints, fine, values)
 
     def _loop(self):
         plant, pacer = self._node.plant, self._node.pacer

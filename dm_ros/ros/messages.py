@@ -40,14 +40,17 @@ def never_called(message):
 class SnapshotMessages:
     """The messages of a tick, reused from tick to tick; ``clutches`` is None where none are."""
 
-    def __init__(self, mechanism):
+    def __init__(self, mechanism, prefix):
+        """:param mechanism: its ``Mechanism``; prefix: before each name."""
         shafts, moments, clutches = mechanism.shafts, mechanism.moments, mechanism.actuators
         n = len(shafts)
         self.joint_states = JointState(
-            name=list(shafts), position=[0.0] * n, velocity=[0.0] * n, effort=[0.0] * n)
-        self.internal_moments = JointState(name=list(moments), effort=[0.0] * len(moments))
+            name=[prefix + shaft for shaft in shafts],
+            position=[0.0] * n, velocity=[0.0] * n, effort=[0.0] * n)
+        self.internal_moments = JointState(
+            name=[prefix + moment for moment in moments], effort=[0.0] * len(moments))
         self.clutches = JointState(
-            name=[clutch.name for clutch in clutches], position=[0.0] * len(clutches),
+            name=[prefix + clutch.name for clutch in clutches], position=[0.0] * len(clutches),
             velocity=[0.0] * len(clutches), effort=[0.0] * len(clutches)) if clutches else None
         self.power_flow = Int8()
         self._no_torque = dict.fromkeys(shafts, 0.0)

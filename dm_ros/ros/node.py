@@ -36,6 +36,7 @@ from dm_ros.ros.loops import (
 from dm_ros.ros.messages import OUTPUT_QOS
 from dm_ros.ros.parameters import declare_all
 from dm_ros.ros.services import Requests
+from dm_ros.ros.strays import strays
 from dm_ros.ros.topics import Inputs, Outputs
 
 SWITCH_INTERVAL = 1e-4   # s that the loop waits at most for a service to let go of the interpreter
@@ -218,7 +219,10 @@ def started(args):
         parser().parse_args(remove_ros_args(args)[1:])
         remove_leftovers()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        return DifferentialNode()
+        node = DifferentialNode()
+        for line in strays(args, node.get_fully_qualified_name()):
+            node.get_logger().warning(line)
+        return node
     except (ValueError, ParameterException, RuntimeError) as error:
         # RuntimeError: of rclpy, such as an unwritable folder for its logs
         raise CannotStart(error) from error

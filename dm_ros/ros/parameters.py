@@ -3,11 +3,15 @@
 
 """The tables of parameters as ROS 2 parameters: declared, described, checked."""
 
+import re
+
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
 from dm_ros.mechanism.variants import PORT_TABLES, variant_named
 from dm_ros.ros.privates import given_parameters
-from dm_ros.settings import known_rows, NodeParameters
+from dm_ros.settings import known_rows, names_for, NodeParameters, passed_over
+
+WITH_EXPONENT = re.compile(r'[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+')
 
 
 def descriptor(entry):
@@ -29,6 +33,8 @@ def declare_all(node):
     """
     Declare all parameters of the node; return ``{full name: value}`` with those of the start.
 
+    One warning names what is given for another mechanism.
+
     :raises ValueError: names the parameter, its value and what is allowed.
     """
     given = given_parameters(node)
@@ -38,17 +44,18 @@ def declare_all(node):
     settings = NodeParameters().changed(
         {name: value for name, value in given.items() if name == 'variant'})
     mechanism = variant_named(settings.variant).mechanism
-    not_mine = [f'initial_velocity.{shaft}' for shaft in ('left', 'right', 'front', 'rear')
-                if shaft not in mechanism.outputs]
-    started = declare(node, settings, given, not_mine)
-    for table in (mechanism.parameters, *(PORT_TABLES[shaft] for shaft in mechanism.inputs)):
-        started |= declare(node, table(), given)
+    mine, started = set(names_for(mechanism)), {}
+    for table in (settings, mechanism.parameters(),
+                  *(PORT_TABLES[shaft]() for shaft in mechanism.inputs)):
+        started |= declare(node, table, given, mine)
+    if line := passed_over(given, mechanism):
+        node.get_logger().warning(line)
     return started
 
 
-def declare(node, table, given, not_mine=()):
-    """Declare the rows of a table but those that are not the node's; return as ``declare_all``."""
-    rows = {name: entry for name, entry in table.rows().values() if name not in not_mine}
+def declare(node, table, given, mine):
+    """Declare the rows of a table that are the node's; return as ``declare_all``."""
+    rows = {name: entry for name, entry in table.rows().values() if name in mine}
     started = table.changed({name: entry.strictly_checked(name, given[name])
                              for name, entry in rows.items() if name in given}).named()
     for name, entry in rows.items():
@@ -57,6 +64,14 @@ def declare(node, table, given, not_mine=()):
 
 
 def strictly_checked(name, value):
-    """Check a value for a parameter, with the types of ROS 2; raise ValueError as ``declare``."""
-    if name in known_rows():
-        known_rows()[name].strictly_checked(name, value)
+    """
+    Return a value for a parameter, checked with the types of ROS 2; raise as ``declare`` does.
+
+    ``ros2 param`` makes a string of ``4e-05``, which a parameter file takes as a double.
+    """
+    if name not in known_rows():
+        return value
+    entry = known_rows()[name]
+    if entry.kind is float and isinstance(value, str) and WITH_EXPONENT.fullmatch(value):
+        value = float(value)
+    return entry.strictly_checked(name, value)

@@ -68,7 +68,12 @@ class WholeRequests(ParameterService):
     """
 
     def __init__(self, node, check):
-        """:param check: function of name and value; raises ValueError for what is not allowed."""
+        """
+        Create the services.
+
+        :param check: function of name and value; returns the value as the parameter takes it, or
+            raises ValueError for what is not allowed.
+        """
         self._check = check
         super().__init__(node)
 
@@ -81,16 +86,32 @@ class WholeRequests(ParameterService):
         return response
 
     def set_parameters_atomically(self, request, response):
-        """Serve ``set_parameters_atomically``."""
+        """Serve ``set_parameters_atomically``; what keeps its value is no change."""
         try:
-            for message in request.parameters:   # rclpy does not always name the parameter
-                if not self._get_node().has_parameter(message.name):
-                    raise ValueError(f'{message.name}: there is no such parameter')
-                self._check(message.name, Parameter.from_parameter_msg(message).value)
+            changes = [change for message in request.parameters
+                       if (change := self._change(message))]
         except ValueError as error:
             response.result.reason = str(error)
             return response
-        return super()._set_parameters_atomically_callback(request, response)
+        if request.parameters and not changes:
+            response.result.successful = True
+            return response
+        return super()._set_parameters_atomically_callback(
+            SetParametersAtomically.Request(parameters=changes), response)
+
+    def _change(self, message):
+        """Return the message as the node takes it, None for a read-only one that stays."""
+        node, name = self._get_node(), message.name
+        if not node.has_parameter(name):   # rclpy does not always name the parameter
+            raise ValueError(f'{name}: there is no such parameter')
+        given = Parameter.from_parameter_msg(message)
+        value = self._check(name, given.value)
+        if node.describe_parameter(name).read_only:
+            before = node.get_parameter(name).value
+            if (type(before), before) == (type(value), value):
+                return None
+        return message if value is given.value else Parameter(
+            name, value=value).to_parameter_msg()
 
     def _set_parameters_callback(self, request, response):
         return self.set_parameters(request, response)

@@ -27,7 +27,7 @@ class Recorder:
 
     def __init__(self, node, mechanism):
         """:param node: full name of the node to record; mechanism: the ``Mechanism`` it runs."""
-        self._mechanism = mechanism
+        self._name, self._mechanism = node, mechanism
         self._context = rclpy.Context()
         rclpy.init(context=self._context,
                    signal_handler_options=rclpy.SignalHandlerOptions.NO)
@@ -74,8 +74,9 @@ class Recorder:
         for message, info in poll(self._power_flow):
             self._flows.append((info['source_timestamp'], message.data))
         for message, _ in poll(self._diagnostics):
-            self.reports += 1
-            for pair in (pair for s in message.status for pair in s.values):
+            mine = [s for s in message.status if s.hardware_id == self._name]
+            self.reports += bool(mine)
+            for pair in (pair for s in mine for pair in s.values):
                 if pair.key == 'missed ticks':
                     self._missed = int(pair.value)
         return len(self._joints) - before

@@ -71,7 +71,7 @@ class Outputs:
         self.power_flow = node.publisher(Int8, '~/power_flow', qos)
         self.clock = node.publisher(Clock, '/clock', qos) if settings.publish_clock else None
         self._simulated_stamps = plant.lockstep or settings.publish_clock
-        self._messages = SnapshotMessages(mechanism)
+        self._messages = SnapshotMessages(mechanism, settings.joint_prefix)
 
     def publish(self, snapshot, stamp=None):
         """

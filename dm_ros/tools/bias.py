@@ -12,6 +12,7 @@ from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.mechanism.bias import forces_for, torque_bias
 from dm_ros.mechanism.power_flow import DIRECT
 from dm_ros.mechanism.variants import MECHANISMS, SELF_LOCKING, variant_named
+from dm_ros.tools.passed_over import warn
 
 DESCRIPTION = """\
 Print how far the clutches of a differential can shift torque between its output shafts, with a
@@ -118,6 +119,7 @@ def run(arguments):
     values = read_parameter_file(arguments.params) if arguments.params else {}
     mechanism = (MECHANISMS[arguments.mechanism] if arguments.mechanism
                  else mechanism_of(values))
+    warn('bias', arguments.params, values, mechanism)
     p = mechanism.parameters().changed(mechanism.parameters.part_of(values))
     if not 0.0 < arguments.torque < math.inf:
         raise ValueError(f'--torque: {arguments.torque!r} is not allowed, '

@@ -29,6 +29,7 @@ from dm_ros.tools.comparison.runs import (
     run,
     ticks_of,
 )
+from dm_ros.tools.passed_over import warn
 from dm_ros.tools.progress import progress
 from dm_ros.tools.tables import add_ignore_columns, remarks
 
@@ -107,6 +108,7 @@ def compare(arguments):
         raise ValueError(f'{arguments.out}: there is a file of this name')
     values = read_parameter_file(arguments.params) if arguments.params else {}
     chosen, source = loads(arguments)
+    warn('compare_variants', arguments.params, values, *chosen)
     if arguments.params:
         source += f' The parameters come from {arguments.params}.'
     for mechanism in chosen:

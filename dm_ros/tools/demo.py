@@ -10,6 +10,7 @@ records what the node publishes, reports it, and writes a CSV and a picture.
 
 import argparse
 from contextlib import contextmanager, suppress
+import json
 import os
 from pathlib import Path
 import signal
@@ -24,6 +25,7 @@ from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.ros.domain import own_domain
 from dm_ros.ros.recorder import Recorder
 from dm_ros.settings import make_simulation, NodeParameters
+from dm_ros.tools.passed_over import warn
 from dm_ros.tools.progress import progress
 
 PATIENCE = 30.0   # s, until the processes have found each other
@@ -106,7 +108,7 @@ def next_report(recorder):
 
 
 def simulation_of(arguments):
-    """Return the simulation that the node will run."""
+    """Return the simulation that the node will run, and all parameters that are given to it."""
     values = read_parameter_file(arguments.params) if arguments.params else {}
     given = {'variant': arguments.variant, 'loss_law': arguments.loss_law, 'rate': arguments.rate}
     values |= {name: value for name, value in given.items() if value is not None}
@@ -114,25 +116,24 @@ def simulation_of(arguments):
     if speeds := simulation.mechanism.half_shafts:
         raise ValueError(f'{arguments.params}: the load is torques, but {", ".join(speeds)} '
                          'would take a speed')
-    return simulation
+    warn('demo', arguments.params, values, simulation.mechanism)
+    return simulation, values
 
 
-def run_processes(arguments, simulation):
+def run_processes(arguments, simulation, values):
     """Return the recorder after a run of the two processes."""
     namespace = f'/demo_{os.getpid()}'   # even in a shared domain nobody else is heard
     parameters = ['--ros-args', '-r', f'__ns:={namespace}']
-    if arguments.params:
-        parameters += ['--params-file', arguments.params]
-    for name, value in (('variant', simulation.variant), ('loss_law', simulation.loss_law),
-                        ('rate', 1 / simulation.dt)):
-        parameters += ['-p', f'{name}:={value}']
+    for name, value in values.items():   # the file may name the node without the namespace
+        parameters += ['-p', f'{name}:={json.dumps(value)}']
     with Recorder(f'{namespace}/differential', simulation.mechanism) as recorder:
         with process('differential', *parameters) as node:
             wait(recorder.poll, 'state of the differential', node)
             wait(next_report(recorder), 'report of the differential', node)
             recorder.clear()
             with process('play_torques', '--variant', simulation.variant,
-                         '--node', f'{namespace}/differential') as player:
+                         '--joint-prefix', values.get('joint_prefix', ''),
+                         '--ros-args', '-r', f'__ns:={namespace}') as player:
                 wait(lambda: recorder.poll() and recorder.loaded, 'torque on a shaft',
                      node, player)
                 end = time.monotonic() + arguments.duration
@@ -171,20 +172,20 @@ def report(record, missed, rate):
 def run(arguments):
     """Do what the command line says; raise OSError, RuntimeError or ValueError where it fails."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    simulation = simulation_of(arguments)
+    simulation, values = simulation_of(arguments)
     with folder_for_results(arguments.out):
         try:
-            run_and_write(arguments, simulation)
+            run_and_write(arguments, simulation, values)
         except Signalled:
             print('demo: ended by a signal, the record is not whole', file=sys.stderr)
             raise
 
 
-def run_and_write(arguments, simulation):
+def run_and_write(arguments, simulation, values):
     """Run the processes, write the record and report it."""
     with own_domain() as domain:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
-        recorder = run_processes(arguments, simulation)
+        recorder = run_processes(arguments, simulation, values)
     variant, rate = simulation.variant, 1 / simulation.dt
     record = recorder.record(
         arguments.duration, f'{variant} at {rate:g} Hz, {simulation.loss_law} law of losses')

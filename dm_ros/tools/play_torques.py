@@ -27,6 +27,7 @@ from dm_ros.mechanism.variants import (
     WITH_CLUTCHES,
 )
 from dm_ros.settings import NodeParameters, port_parameters, speed_ports
+from dm_ros.tools.passed_over import warn
 from dm_ros.tools.progress import progress
 from dm_ros.tools.tables import add_ignore_columns, remarks
 
@@ -36,8 +37,11 @@ row's torques hold until the time of the next row, those of the last row beyond 
 begins later than 1000 s, as at an epoch, is played from its first row on. Forces on
 clutches, in columns <clutch>_clutch, are played where CSV has any. Where FILE has a speed port
 (port.<shaft>.kind: speed), the column of its shaft is the speed outside in rad/s. Without
---duration the last time ends the playing. All goes to the topic <node>/torques, in one message. At
-the end, and on Ctrl-C or SIGTERM as well, zeros are published so that no load stays behind.
+--duration the last time ends the playing. All goes to the topic <node>/torques, in one message. A
+<node> without / in front is in the namespace of this one: --ros-args -r __ns:=/rear is enough to
+play to /rear/differential. Where the node has a joint_prefix the names in messages need it too,
+from FILE or --joint-prefix; those in CSV have none. At the end, and on Ctrl-C or SIGTERM as well,
+zeros are published so that no load stays behind.
 """
 
 
@@ -59,8 +63,11 @@ def parser():
                         help='messages in a second; default: 100')
     result.add_argument('--duration', type=_positive, metavar='S',
                         help='how long to play; default: to the end of CSV, or endless')
-    result.add_argument('--node', default='/differential', metavar='NAME',
-                        help='name of the differential node; default: %(default)s')
+    result.add_argument('--node', default='differential', metavar='NAME',
+                        help='name of the differential node, in the namespace of this one or '
+                        'full; default: %(default)s')
+    result.add_argument('--joint-prefix', metavar='PREFIX',
+                        help='before the names in messages; default: joint_prefix of FILE')
     result.add_argument('--wait', type=_not_negative, default=10.0, metavar='S',
                         help='how long to wait for a subscriber before playing all the same; '
                         'default: 10')
@@ -83,12 +90,12 @@ def _positive(text):
 class Player:
     """Publishes torques, outside speeds, and forces on clutches, to a node's topic ``torques``."""
 
-    def __init__(self, node, target, ports):
+    def __init__(self, node, target, ports, prefix=''):
+        """:param target: name of the differential; prefix: before the names of the ports."""
         self._node, self._ports = node, ports
         reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-        topic = f'{target.rstrip("/")}/torques'
-        self._publisher = node.create_publisher(JointState, topic, reliable)
-        self._message = JointState(name=[port.name for port in ports])
+        self._publisher = node.create_publisher(JointState, topic_of(target), reliable)
+        self._message = JointState(name=[prefix + port.name for port in ports])
 
     def wait(self, seconds):
         """Wait for a subscriber, at most so long, and tell how it went."""
@@ -137,16 +144,33 @@ class Player:
         self._publisher.wait_for_all_acked(Duration(seconds=1))
 
 
-def load(arguments):
-    """
-    Return what to play: rate, ports, a function of n, the number of messages or None.
+def full_name(node, target):
+    """Return the full name of the differential to which a node plays."""
+    topic = node.resolve_topic_name(topic_of(target), only_expand=True)
+    return topic.removesuffix('/torques')
 
+
+def topic_of(target):
+    """Return the topic of a differential on which one message takes all."""
+    return f'{target.rstrip("/")}/torques'
+
+
+def load(arguments, target='/differential'):
+    """
+    Return what to play: rate, ports, a function of n, the number of messages or None, a prefix.
+
+    :param target: full name of the node for which FILE counts.
     :raises ValueError: for a CSV that is not as it should be, or none where one is needed.
     """
     rate, count = NodeParameters().changed({'rate': arguments.rate}).rate, None
-    values = read_parameter_file(arguments.params) if arguments.params else {}
+    values = read_parameter_file(arguments.params, target) if arguments.params else {}
+    prefix = arguments.joint_prefix
+    if prefix is None:
+        prefix = values.get('joint_prefix', '')
+    NodeParameters(joint_prefix=prefix)   # refuses what is none
     mechanism = (MECHANISMS[arguments.profile] if arguments.profile
                  else variant_named(values.get('variant', arguments.variant)).mechanism)
+    warn('play_torques', arguments.params, values, mechanism, node=target)
     speeds = speed_ports(port_parameters(mechanism.inputs, values))
     mechanism = equipped(WITH_CLUTCHES[mechanism.name], mechanism.parameters(), speeds)
     ports = mechanism.ports
@@ -166,7 +190,7 @@ def load(arguments):
             return mechanism.load(n / rate)
     if arguments.duration:
         count = max(1, round(arguments.duration * rate))
-    return rate, ports, torques_at, count
+    return rate, ports, torques_at, count, prefix
 
 
 def run(args):
@@ -174,10 +198,12 @@ def run(args):
     player = None
     try:
         arguments = parser().parse_args(remove_ros_args(args)[1:])
-        rate, ports, torques_at, count = load(arguments)
         # rclpy's own handlers would shut down before the zero torques are out
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        player = Player(rclpy.create_node('play_torques'), arguments.node, ports)
+        node = rclpy.create_node('play_torques')
+        rate, ports, torques_at, count, prefix = load(
+            arguments, full_name(node, arguments.node))
+        player = Player(node, arguments.node, ports, prefix)
         player.wait(arguments.wait)
         player.play(torques_at, rate, count)
     finally:

@@ -23,6 +23,7 @@ from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.motion.simulation import NO_FORCE
 from dm_ros.settings import make_simulation, NodeParameters
+from dm_ros.tools.passed_over import warn
 from dm_ros.tools.progress import progress
 from dm_ros.tools.tables import add_ignore_columns, remarks, unit_hint
 
@@ -137,6 +138,7 @@ def run(arguments):
     is_auto = arguments.dt == 'auto'
     simulation = make_simulation(variant, values, None if is_auto else arguments.dt)
     mechanism = simulation.mechanism
+    warn('simulate', arguments.params, values, mechanism)
     table = read_torque_file(arguments.torques, mechanism.ports, mechanism.clutch_moments,
                              arguments.ignore_columns)
     try:

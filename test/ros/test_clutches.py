@@ -41,7 +41,7 @@ def load(n):
 def told(diagnostics):
     """Return the newest status of the inputs as (level, message, values)."""
     for status in (s for message in reversed(diagnostics) for s in message.status):
-        if status.name == 'differential: torques':
+        if status.name == '/differential: torques':
             return status.level, status.message, {v.key: v.value for v in status.values}
     return None, '', {}
 

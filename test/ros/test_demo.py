@@ -87,6 +87,19 @@ def test_it_runs_with_the_parameters_of_a_file(tmp_path):
     assert any(float(row['moment.left_clutch']) for row in rows)
 
 
+def test_its_node_has_what_a_file_gives_to_the_node_without_a_namespace(tmp_path):
+    file = tmp_path / 'node.yaml'
+    file.write_text('/differential: {ros__parameters: {symmetric.inertia.satellite: 5e-05, '
+                    'joint_prefix: rear_, energy_audit: false, symmetric: {clutch: {left: '
+                    '{friction_surfaces: 4, preload: 100.0}}}}}')
+    with Forked(DEMO, '--params', file, '--duration', 0.5, '--out', tmp_path) as demo:
+        assert demo.ended() == 0, demo.errors
+        assert 'forces on left' in demo.errors and 'nothing' not in demo.errors
+    with open(tmp_path / 'symmetric_ode.csv', newline='') as file:
+        rows = list(csv.DictReader(file))
+    assert any(float(row['moment.left_clutch']) for row in rows)
+
+
 def test_a_file_with_a_speed_port_is_refused_in_one_line(tmp_path):
     (tmp_path / 'speed.yaml').write_text('/**: {ros__parameters: {port.left.kind: speed}}')
     with Forked(DEMO, '--params', tmp_path / 'speed.yaml', '--out', tmp_path) as demo:

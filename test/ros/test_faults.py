@@ -56,7 +56,7 @@ def torques(names, efforts, stamp=0):
     return message
 
 
-def told(diagnostics, which, node='differential'):
+def told(diagnostics, which, node='/differential'):
     """Return the newest status of a part of a node as (level, message, values)."""
     for status in (s for message in reversed(diagnostics) for s in message.status):
         if status.name == f'{node}: {which}':

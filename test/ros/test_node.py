@@ -9,6 +9,8 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -17,10 +19,16 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 import rclpy
-from rclpy.parameter import Parameter
+from rclpy.parameter import (
+    get_parameter_value,
+    Parameter,
+    parameter_dict_from_yaml_file,
+    parameter_value_to_python,
+)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int8
 from std_srvs.srv import SetBool, Trigger
+import yaml
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
@@ -207,6 +215,74 @@ def test_a_request_with_one_impossible_parameter_changes_nothing(ros, service, b
     assert node.simulation.substeps == 1
 
 
+def dump_and_load(ros, path):
+    """Write a file as ``ros2 param dump`` does; return what ``ros2 param load`` makes of it."""
+    names = ros.call(ListParameters, '/differential/list_parameters').result.names
+    values = ros.call(GetParameters, '/differential/get_parameters', names=names).values
+    tree = {}
+    for name, value in zip(names, values, strict=True):
+        *groups, leaf = name.split('.')
+        branch = tree
+        for group in groups:
+            branch = branch.setdefault(group, {})
+        branch[leaf] = parameter_value_to_python(value)
+    path.write_text(yaml.dump({'/differential': {'ros__parameters': tree}}))
+    return list(parameter_dict_from_yaml_file(str(path)).values())
+
+
+@pytest.mark.parametrize('service', ['set_parameters', 'set_parameters_atomically'])
+@pytest.mark.parametrize('variant, more', [
+    ('symmetric_ode', {}), ('lsd_ode', {'port__rear__kind': 'speed'}),
+    ('symmetric_dae', {'use_sim_time': True})])
+def test_loading_its_own_dump_succeeds_and_changes_nothing(ros, tmp_path, service, variant, more):
+    node = ros.differential(variant, **more)
+    before = node.plant.values
+    loaded = dump_and_load(ros, tmp_path / 'dump.yaml')
+    kind = SetParameters if service == 'set_parameters' else SetParametersAtomically
+    response = ros.call(kind, f'/differential/{service}', parameters=loaded)
+    results = response.results if service == 'set_parameters' else [response.result]
+    assert {result.reason for result in results} == {''}
+    assert all(result.successful for result in results)
+    assert len(results) == (len(loaded) if service == 'set_parameters' else 1)
+    assert node.plant.values == before
+
+
+@pytest.mark.parametrize('service', ['set_parameters', 'set_parameters_atomically'])
+@pytest.mark.parametrize('same, other', [
+    ({'rate': 200.0}, {'rate': 100.0}), ({'variant': 'lsd_ode'}, {'variant': 'lsd_dae'}),
+    ({'energy_audit': True}, {'energy_audit': False}),
+    ({'realtime_priority': 0}, {'realtime_priority': False}),
+    ({'start_type_description_service': True}, {'start_type_description_service': False})])
+def test_a_read_only_parameter_may_be_set_to_the_value_it_has_alone_or_in_a_set(
+        ros, service, same, other):
+    node = ros.differential('lsd_ode')
+    kind = SetParameters if service == 'set_parameters' else SetParametersAtomically
+
+    def succeeds(**parameters):
+        response = ros.call(kind, f'/differential/{service}', parameters=as_messages(**parameters))
+        results = response.results if service == 'set_parameters' else [response.result]
+        succeeded, = {result.successful for result in results}
+        return succeeded
+    assert succeeds(**same)
+    assert succeeds(substeps=2, **same) and node.simulation.substeps == 2
+    assert not succeeds(substeps=3, **other) and node.simulation.substeps == 2
+    assert not succeeds(**other)
+
+
+def test_a_number_with_an_exponent_of_which_ros2_param_makes_a_string_is_a_double(ros):
+    node = ros.differential()
+
+    def succeeds(text):
+        value = get_parameter_value(text)
+        result, = ros.call(SetParameters, '/differential/set_parameters', parameters=[
+            ParameterMessage(name='symmetric.inertia.satellite', value=value)]).results
+        return result.successful
+    assert get_parameter_value('5e-05').type == ParameterType.PARAMETER_STRING
+    assert succeeds('5e-05') and node.simulation.parameters.I_s == 5e-5
+    assert not succeeds('1e300') and not succeeds('5') and not succeeds('five')
+    assert node.simulation.parameters.I_s == 5e-5
+
+
 def test_parameters_that_are_only_possible_together_are_taken_together(ros):
     node = ros.differential('lsd_ode')
     response = ros.call(
@@ -335,6 +411,72 @@ def test_several_differentials_live_in_their_namespaces(ros):
     centre = ros.listen(JointState, '/centre/joint_states')
     ros.until(lambda: front and centre)
     assert (len(front[0].name), len(centre[0].name)) == (5, 4)
+
+
+def test_diagnostics_of_several_differentials_are_told_apart_by_their_full_names(ros):
+    ros.differential(arguments=['--ros-args', '-r', '__ns:=/car/front'])
+    ros.differential('lsd_ode', arguments=['--ros-args', '-r', '__ns:=/car/rear'])
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    names = ['/car/front/differential', '/car/rear/differential']
+    parts = ['loop', 'torques', 'connections', 'energy']
+
+    def heard():
+        return {(status.hardware_id, status.name)
+                for message in diagnostics for status in message.status}
+    ros.until(lambda: len(heard()) >= 8)
+    assert heard() == {(name, f'{name}: {part}') for name in names for part in parts}
+
+
+def prefixed(names, prefix='rear_'):
+    return [prefix + name for name in names]
+
+
+@pytest.mark.parametrize('variant, more', [
+    ('lsd_ode', {}), ('symmetric_ode', {'symmetric__clutch__left__friction_surfaces': 4}),
+    ('lsd_dae', {'port__rear__kind': 'speed'})])
+def test_a_joint_prefix_is_before_every_name_that_goes_out(ros, variant, more):
+    node = ros.differential(variant, joint_prefix='rear_', **more)
+    mechanism = node.simulation.mechanism
+    heard = {topic: ros.listen(JointState, f'/differential/{topic}')
+             for topic in ('joint_states', 'internal_moments', 'clutches')}
+    ros.until(lambda: all(heard.values()))
+    names = {topic: messages[-1].name for topic, messages in heard.items()}
+    assert names == {'joint_states': prefixed(mechanism.shafts),
+                     'internal_moments': prefixed(mechanism.moments),
+                     'clutches': prefixed(mechanism.clutch_moments)}
+
+
+@pytest.mark.parametrize('prefix', ['rear_', 'axle2/', 'L.'])
+def test_a_joint_prefix_is_before_every_name_that_comes_in_but_in_no_topic(ros, prefix):
+    node = ros.differential('lsd_ode', joint_prefix=prefix, torque_timeout=0.0,
+                            port__rear__kind='speed', rate=50.0)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    torques = ros.publisher(JointState, '/differential/torques')
+
+    def publish(names):
+        torques.publish(JointState(name=names, effort=[3.0, math.nan, 40.0],
+                                   velocity=[math.nan, 0.5, math.nan]))
+    names = ['carrier', 'rear', 'rear_clutch']
+    publish(names)
+    ros.until(lambda: diagnostics and keys(diagnostics, 'torques')[0]['refused messages'] == '1')
+    assert keys(diagnostics, 'torques')[0]['last refused'].startswith(
+        f"~/torques: 'carrier' is not one of {prefix}carrier, {prefix}front, ")
+    publish(prefixed(names, prefix))
+    ros.until(lambda: node.plant.inputs.in_force(0) == (3.0, 0.0, 0.5, 0.0, 40.0))
+    ros.publisher(Float64, '/differential/torque/front').publish(Float64(data=2.0))
+    ros.publisher(Float64, '/differential/clutch/front').publish(Float64(data=7.0))
+    ros.until(lambda: node.plant.inputs.in_force(0) == (3.0, 2.0, 0.5, 7.0, 40.0))
+
+
+def test_in_lockstep_names_have_the_joint_prefix_too(ros):
+    node = ros.differential('lsd_ode', mode='lockstep', joint_prefix='rear_')
+    joints = ros.listen(JointState, '/differential/joint_states')
+    torques = ros.publisher(JointState, '/differential/torques')
+    torques.publish(JointState(name=['carrier'], effort=[1.0]))
+    torques.publish(JointState(name=['rear_carrier'], effort=[2.0]))
+    ros.until(lambda: joints)
+    assert (node.plant.inputs.refused, node.simulation.ticks) == (1, 1)
+    assert joints[0].effort[joints[0].name.index('rear_carrier')] == 2.0
 
 
 @pytest.mark.parametrize('name, table', [

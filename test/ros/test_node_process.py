@@ -47,6 +47,66 @@ def test_a_preset_loads_with_its_variant(ros, preset, words):
         assert words in process.errors
 
 
+def warnings_of(ros, arguments):
+    """Return the warnings of a node as it starts, which it does."""
+    with start('--ros-args', '-r', '__node:=axle', *arguments) as process:
+        joints = ros.listen(JointState, '/axle/joint_states')
+        ros.until(lambda: joints)
+        assert process.ended(signal.SIGTERM) == 0
+        return [line for line in process.errors.splitlines() if '[WARN]' in line]
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (['-p', 'lsd.clutch.rear.preload:=-50.0'],
+     '1 parameter of another mechanism than the symmetric differential counts for nothing: '
+     'lsd.clutch.rear.preload'),
+    (['-p', 'variant:=lsd_ode', '-p', 'port.left.kind:=speed', '-p', 'port.rear.damping:=9.0',
+      '-p', 'initial_velocity.right:=3.0'],
+     '2 parameters of another mechanism than the self-locking differential count for nothing: '
+     'port.left.kind, initial_velocity.right'),
+    (['--params-file', CONFIG / 'lsd.yaml'], 'lsd.viscosity.satellite'),
+    (['-p', 'differential:rate:=7.0'], 'not for /axle, but for /differential'),
+])
+def test_parameters_of_the_other_mechanism_and_of_other_nodes_are_told_in_one_line(
+        ros, arguments, words):
+    line, = warnings_of(ros, arguments)
+    assert words in line
+
+
+@pytest.mark.parametrize('section, is_told', [
+    ('differential', True), ('/axel', True), ('/car/axle', True),
+    ('/axle', False), ('/**', False), ('/*', False), ('/**/axle', False)])
+def test_a_file_for_other_nodes_alone_is_told_where_it_changes_nothing(
+        ros, tmp_path, section, is_told):
+    file = tmp_path / 'node.yaml'
+    file.write_text(f'"{section}": {{ros__parameters: {{rate: 7.0}}}}\n')
+    lines = warnings_of(ros, ['--params-file', file])
+    told = f'{file}: nothing in it is for /axle, but for /{section.lstrip("/")}'
+    assert [line.endswith(told) for line in lines] == [True] * is_told
+
+
+@pytest.mark.parametrize('parameters, words', [
+    ('rate: 100', ['rate: 100 ', 'a double']),
+    ('symmetric.inertia.left: 1', ['symmetric.inertia.left: 1 ', 'a double']),
+    ('symmetric: {clutch: {left: {preload: 50}}}', ['symmetric.clutch.left.preload: 50 ']),
+    ('substeps: 2.0', ['substeps: 2.0 ', 'an integer']),
+    ('energy_audit: 1', ['energy_audit: 1 ', 'a boolean']),
+    ('variant: 1', ['variant: 1 ', 'lsd_ode']),
+    ('rate: [100.0]', ['rate: ', 'a double']),
+    ('use_sim_time: 1', ['use_sim_time', 'BOOL']),
+    ('start_type_description_service: 1', ['start_type_description_service', 'BOOL'])])
+def test_a_value_of_another_type_in_a_file_as_launch_writes_it_ends_it_with_code_2_and_one_line(
+        ros, tmp_path, parameters, words):
+    file = tmp_path / 'launch_params'
+    file.write_text(f'/**:\n  ros__parameters:\n    {parameters}\n')
+    with start('--ros-args', '-r', '__node:=rear', '-r', '__ns:=/car', '--params-file',
+               file) as process:
+        assert process.ended() == 2
+        line, = process.errors.strip().splitlines()
+    assert line.startswith('differential: error: ')
+    assert all(word in line for word in words), line
+
+
 @pytest.mark.parametrize('parameter, words', [
     ('symmetric.efficiency.left_mesh:=1.5', ['symmetric.efficiency.left_mesh', '1.5', '(0, 1]']),
     ('symmetric.satellite_count:=0', ['symmetric.satellite_count', '0']),
@@ -54,6 +114,7 @@ def test_a_preset_loads_with_its_variant(ros, preset, words):
     ('rate:=100', ['rate', '100', 'double']),
     ('variant:=torsen', ['variant', 'torsen', 'lsd_ode']),
     ('loss_law:=torsen', ['loss_law', 'torsen', 'passive, paper']),
+    ('joint_prefix:=2rear', ['joint_prefix', '2rear', 'letter']),
     ('symmetric.inertia.wheel:=1.0', ['symmetric.inertia.wheel']),
 ])
 def test_an_unknown_or_impossible_parameter_ends_it_with_code_2_and_one_line(

@@ -53,6 +53,16 @@ def test_plays_a_built_in_load_and_ends_with_zero(ros, play, arguments, profile,
     assert list(last.effort) == [0.0, 0.0, 0.0]
 
 
+def test_warns_of_a_file_for_another_node_and_of_one_for_the_other_mechanism(play, tmp_path):
+    file = tmp_path / 'node.yaml'
+    file.write_text('/other: {ros__parameters: {variant: lsd_ode}}')
+    options = '--wait', 0, '--duration', 0.1, '--params'
+    other, lsd = play(*options, file), play(*options, PRESETS.parent / 'lsd.yaml')
+    assert other.ended() == lsd.ended() == 0
+    assert f'warning: {file}: nothing in it is for /differential, but for /other' in other.errors
+    assert 'play_torques: warning: 33 parameters of another mechanism' in lsd.errors
+
+
 def test_plays_forces_where_the_file_has_any_and_ends_with_open_clutches(ros, play, tmp_path):
     file = tmp_path / 'torques.csv'
     file.write_text('time,carrier,front,rear,rear_clutch\n0,30,-10,-15,500\n0.4,0,0,0,0\n')
@@ -73,7 +83,7 @@ def test_plays_a_file_to_its_end(ros, play, tmp_path):
     file.write_text('right,time,left,pinion\n' + ''.join(
         f'{right},{n / 50},{left},{pinion}\n' for n, (pinion, left, right) in enumerate(rows)))
     arguments = ['--torques', str(file), '--wait', '60']
-    _, _, torques_at, count = load(parser().parse_args(arguments))
+    _, _, torques_at, count, _ = load(parser().parse_args(arguments))
     assert [torques_at(n) for n in range(count)] == [row for row in rows[:-1] for _ in range(2)]
     messages = listen(ros)
     process = play(*arguments)
@@ -110,11 +120,35 @@ def test_a_signal_unloads_and_ends_cleanly(ros, play, number):
 
 @pytest.mark.parametrize('arguments', [
     ['--node', '/my/axle'],
+    ['--node', 'axle', '--ros-args', '-r', '__ns:=/my'],
+    ['--ros-args', '-r', '__ns:=/my', '-r', 'differential/torques:=/my/axle/torques'],
     ['--ros-args', '-r', '/differential/torques:=/my/axle/torques']])
 def test_the_topic_can_be_chosen(ros, play, arguments):
     messages = listen(ros, '/my/axle/torques')
     play('--wait', 60, *arguments)
     ros.until(lambda: len(messages) > 1)
+
+
+def test_in_a_namespace_it_drives_the_differential_of_that_namespace(ros, play):
+    there = [ros.differential(arguments=['--ros-args', '-r', f'__ns:=/{name}'])
+             for name in ('front', 'rear')]
+    states = listen(ros, '/rear/differential/joint_states')
+    play('--wait', 60, '--ros-args', '-r', '__ns:=/rear')
+    ros.until(lambda: states and abs(states[-1].velocity[states[-1].name.index('left')]) > 1.0)
+    assert [node.plant.inputs.received > 0 for node in there] == [False, True]
+
+
+@pytest.mark.parametrize('by_file', [False, True])
+def test_plays_to_a_node_with_a_joint_prefix(ros, play, tmp_path, by_file):
+    node = ros.differential('lsd_ode', joint_prefix='rear_',
+                            arguments=['--ros-args', '-r', '__ns:=/car'])
+    file = tmp_path / 'node.yaml'
+    file.write_text('/car/differential: {ros__parameters: '
+                    '{joint_prefix: rear_, variant: lsd_ode}}')
+    process = play('--wait', 60, '--ros-args', '-r', '__ns:=/car', '--', *(
+        ['--params', file] if by_file else ['--variant', 'lsd_ode', '--joint-prefix', 'rear_']))
+    ros.until(lambda: node.plant.inputs.received > 10)
+    assert node.plant.inputs.refused == 0 and 'warning' not in process.errors
 
 
 def test_without_a_subscriber_it_warns_and_plays_all_the_same(ros, play):
@@ -138,6 +172,7 @@ def test_drives_the_node(ros, play):
     (['--duration', 'nan'], '--duration: nan must be in'),
     (['--profile', 'lsd', '--variant', 'lsd_ode'], 'not allowed with'),
     (['--params', 'missing.yaml'], 'missing.yaml: No such file'),
+    (['--joint-prefix', ' '], "joint_prefix: ' ' is not allowed"),
     (['--what'], 'unrecognized arguments'),
     (['--ros-args', '-r', 'what'], "remap rule: '-r what'"),
     (['--ros-args', '--what'], '--what')])

@@ -35,7 +35,7 @@ def demand(names, effort=(), velocity=()):
 def told(diagnostics):
     """Return the newest status of the inputs as (level, message, values)."""
     for status in (s for message in reversed(diagnostics) for s in message.status):
-        if status.name == 'differential: torques':
+        if status.name == '/differential: torques':
             return status.level, status.message, {v.key: v.value for v in status.values}
     return None, '', {}
 
@@ -294,7 +294,7 @@ def test_a_file_is_played_with_speeds_where_the_parameters_say_so(tmp_path):
     (tmp_path / 'in.csv').write_text('time,pinion,left,right\n0.5,1,2,3\n1,4,5,6\n')
     arguments = ['--params', str(tmp_path / 'speed.yaml')]
     played = [*arguments, '--torques', str(tmp_path / 'in.csv')]
-    _, ports, at, _ = load(parser().parse_args(played))
+    _, ports, at, *_ = load(parser().parse_args(played))
     assert [port.kind for port in ports] == ['torque', 'speed', 'torque']
     assert at(0) == (0.0, None, 0.0) and at(60) == (1.0, 2.0, 3.0)
     with pytest.raises(ValueError, match='--torques: it is needed where speed comes in, on left'):
