@@ -370,7 +370,7 @@ class NodeMachine(RuleBasedStateMachine):
             before = inputs.received, inputs.refused, self.in_force()[-2]
             refused_ticks = self.node.plant.out_of_range.count
             with self.node.control.lock:
-                self.node.lockstep_tick(message)
+                self.node.lockstep_tick(message, {'publication_sequence_number': None})
             assert (inputs.received - before[0], inputs.refused - before[1]) == (
                 (1, 0) if good else (0, 1))
             if not good:

@@ -45,6 +45,7 @@ class HeldInputs:
         """Drop all demands: every port waits for its first one."""
         self._demand = [port.idle for port in self.ports]
         self._arrival = [None] * len(self.ports)
+        self.commanded = []   # the ports of the last demand that was taken, by index
 
     def demand(self, names, values, tick, sparse=False):
         """
@@ -126,6 +127,7 @@ class HeldInputs:
                 raise ValueError(refusal)
             demands.append((i, value))
         clamped = []
+        self.commanded = [i for i, _ in demands]
         for i, value in demands:
             limit = self.limits[i]
             self._demand[i] = min(max(value, -limit), limit)

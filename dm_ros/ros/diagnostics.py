@@ -44,6 +44,7 @@ class Diagnostics:
         self._node, log = node, node.get_logger()
         self.missing = Condition('ticks are missed', log)
         self.misfitting = Condition('QoS does not fit', log)
+        self.contested = Condition('several sources command one shaft or clutch', log)
         self.ambiguous = Condition('another node has the same name', log)
         self._before = 0, time.monotonic_ns()
 
@@ -58,7 +59,7 @@ class Diagnostics:
         if isinstance(plant.simulation, AuditedSimulation):
             statuses.append(self._energy())
         plant.settle()
-        for condition in (self.missing, self.misfitting, self.ambiguous):
+        for condition in (self.missing, self.misfitting, self.contested, self.ambiguous):
             condition.settle()
         return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
 
@@ -106,14 +107,19 @@ class Diagnostics:
 
     def _connections(self):
         misfits = '; '.join(f'{t}: {what}' for t, what in self._node.neighbours.misfits().items())
+        contested = '; '.join(
+            f'{port}: {who}' for port, who in self._node.inputs.sources.contested().items())
         namesakes = self._node.neighbours.namesakes()
         if misfits:
             self.misfitting.happened(misfits)
+        if contested:
+            self.contested.happened(contested)
         if namesakes:
             self.ambiguous.happened(f'{namesakes} more')
         return self._status(
-            'connections', active(self.misfitting, self.ambiguous), 'fine', {
+            'connections', active(self.misfitting, self.contested, self.ambiguous), 'fine', {
                 'QoS that does not fit': misfits or 'none',
+                'commanded by several sources': contested or 'none',
                 'other nodes of the same name': namesakes})
 
     def _energy(self):

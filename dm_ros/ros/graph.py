@@ -39,6 +39,11 @@ class Neighbours:
         return {topic: f'{policies[topic]} of {", ".join(others)}'
                 for topic, others in found.items()}
 
+    def publishers(self, topic):
+        """Return the full names of the nodes of all publishers of a topic."""
+        return [full_name(endpoint) for endpoint in self._node.get_publishers_info_by_topic(
+            self._node.resolve_topic_name(topic))]
+
     def namesakes(self):
         """Return the number of other nodes of the same full name."""
         node = self._node

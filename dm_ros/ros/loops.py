@@ -77,7 +77,7 @@ def follow_ros_clock(control, pacer, clock, tick):
 
 
 def follow_messages(control, subscription, context, tick):
-    """Call ``tick(message)`` for each message of a polled subscription, in their order."""
+    """Call ``tick(message, info)`` for each message of a polled subscription, in their order."""
     waiter = Waiter(subscription, context)
     while not control.stopping.is_set():
         if not control.running.wait(LONGEST_WAIT):
@@ -89,4 +89,4 @@ def follow_messages(control, subscription, context, tick):
                 # what is not taken while paused stays in the queue
                 taken = control.running.is_set() and take(subscription)
                 if taken:
-                    tick(taken[0])
+                    tick(*taken)

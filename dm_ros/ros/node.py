@@ -20,7 +20,6 @@ from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from dm_ros.ending import run_command
-from dm_ros.motion.held_inputs import Joints
 from dm_ros.motion.pacing import Pacer
 from dm_ros.plant import Plant
 from dm_ros.ros.diagnostics import Diagnostics
@@ -181,11 +180,10 @@ class DifferentialNode(Node):
             self.inputs.take()
         self._advance()
 
-    def lockstep_tick(self, message):
-        """Advance one tick with a message and answer it, or refuse both."""
+    def lockstep_tick(self, message, info):
+        """Advance one tick with a message and answer it, or refuse both; info: of ``take``."""
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        joints = Joints(message.effort, message.velocity)
-        if self.plant.take(message.name, joints, '~/torques', stamp, sparse=True):
+        if self.inputs.take_grouped(message, info, stamp):
             self._advance()
 
     def _followed_tick(self):

@@ -19,6 +19,7 @@ from dm_ros.ros.messages import (
     SnapshotMessages,
 )
 from dm_ros.ros.privates import poll
+from dm_ros.ros.sources import Sources
 
 
 class Inputs:
@@ -42,15 +43,27 @@ class Inputs:
                                     LOCKSTEP_INPUT_QOS if plant.lockstep else SHARED_QOS)
         if plant.lockstep:   # in real time publishers of all kinds are heard
             node.neighbours.watch('~/torques', 'RELIABILITY')
+        self.sources = Sources(plant.inputs.names, {
+            topic: (port, subscription) for topic, port, subscription in self._single},
+            node.neighbours)
 
     def take(self):
         """Let the plant take what came since the last tick."""
         for topic, port, subscription in self._single:
             for message, _ in poll(subscription):
-                self._plant.take((port,), (message.data,), topic)
-        for message, _ in poll(self.torques):
-            self._plant.take(message.name, Joints(message.effort, message.velocity), '~/torques',
-                             sparse=True)
+                if self._plant.take((port,), (message.data,), topic):
+                    self.sources.note(self._plant.inputs.commanded, False, None)
+        for message, info in poll(self.torques):
+            self.take_grouped(message, info)
+
+    def take_grouped(self, message, info, stamp=0):
+        """Let the plant take a message of ``~/torques``; return whether it was taken."""
+        taken = self._plant.take(message.name, Joints(message.effort, message.velocity),
+                                 '~/torques', stamp, sparse=True)
+        if taken:
+            self.sources.note(self._plant.inputs.commanded, True,
+                              info['publication_sequence_number'])
+        return taken
 
     def discard(self):
         """Drop all waiting messages on ``~/torques``; return their number."""

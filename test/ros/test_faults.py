@@ -16,6 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from processes import Forked
 import pytest
 from rcl_interfaces.srv import SetParameters
+import rclpy
 from rclpy.clock import ClockType
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -26,6 +27,7 @@ from dm_ros.motion.pacing import Pacer
 from dm_ros.ros import loops
 from dm_ros.ros.loops import Control, follow_steady_clock
 from dm_ros.ros.messages import LOCKSTEP_OUTPUT_QOS
+from dm_ros.ros.sources import Sources
 
 ROOT = Path(__file__).parents[2]
 TORQUES, JOINTS = '/differential/torques', '/differential/joint_states'
@@ -275,6 +277,114 @@ def test_in_real_time_torques_of_every_qos_are_heard(ros, profile):
         publisher.publish(torques(['left'], [4.0]))
         return node.simulation.snapshot().torque[1] == 4.0
     ros.until(heard)
+
+
+class Nodes:
+    """Other nodes of this test, with publishers; what each publishes is its own command."""
+
+    def __init__(self, ros):
+        self._ros, self._nodes, self._sends = ros, [], []
+
+    def publisher(self, name, message_type, topic, message):
+        node = rclpy.create_node(name, context=self._ros.context)
+        self._nodes.append(node)
+        publisher = node.create_publisher(message_type, topic, 10)
+        self._ros.until(lambda: publisher.get_subscription_count() > 0)
+        self._sends.append(lambda: publisher.publish(message))
+
+    def torques(self, name, shafts, efforts):
+        self.publisher(name, JointState, TORQUES, torques(shafts, efforts))
+
+    def send(self):
+        for send in self._sends:
+            send()
+        return True
+
+    def close(self):
+        self._sends.clear()
+        for node in self._nodes:
+            node.destroy_node()
+
+
+@pytest.fixture
+def nodes(ros):
+    nodes = Nodes(ros)
+    yield nodes
+    nodes.close()
+
+
+def contested(diagnostics):
+    """Return level, message and who commands what several do, of the newest report."""
+    level, message, values = told(diagnostics, 'connections')
+    return level, message, values.get('commanded by several sources')
+
+
+FINE = (DiagnosticStatus.OK, 'fine', 'none')
+SEVERAL = DiagnosticStatus.WARN, 'several sources command one shaft or clutch'
+
+
+@pytest.mark.parametrize('names, words', [
+    (['one', 'other'], '/one, /other'), (['player', 'player'], '/player (2)')])
+@pytest.mark.parametrize('topic, port', [('torque/left', 'left'), ('clutch/rear', 'rear_clutch')])
+def test_two_publishers_on_the_topic_of_one_shaft_are_named_until_one_goes(
+        ros, nodes, names, words, topic, port):
+    ros.differential('lsd_ode' if 'rear' in topic else 'symmetric_ode')
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    for name in names:
+        assert contested(diagnostics) in (FINE, (None, '', None))
+        nodes.publisher(name, Float64, f'/differential/{topic}', Float64(data=1.0))
+    ros.until(lambda: nodes.send() and contested(diagnostics) == (
+        *SEVERAL, f'{port}: ~/{topic} of {words}'))
+    nodes.close()
+    ros.until(lambda: contested(diagnostics) == FINE)
+
+
+@pytest.mark.parametrize('mode', ['realtime', 'lockstep'])
+def test_nodes_that_command_one_shaft_by_the_grouped_topic_are_named_until_one_stops(
+        ros, nodes, mode):
+    ros.differential(mode=mode)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    nodes.torques('engine', ['pinion', 'left'], [5, math.nan])
+    nodes.torques('one', ['left', 'right'], [1, 1])
+    nodes.torques('other', ['right'], [2])
+    ros.until(lambda: nodes.send() and contested(diagnostics) == (
+        *SEVERAL, 'right: ~/torques of /engine, /one, /other'))
+    ros.until(lambda: contested(diagnostics) == FINE)
+
+
+def test_a_shaft_that_is_commanded_by_both_topics_is_told_with_the_nodes(ros, nodes):
+    ros.differential()
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    nodes.torques('one', ['left', 'right'], [1, 1])
+    nodes.publisher('other', Float64, '/differential/torque/left', Float64(data=2.0))
+    ros.until(lambda: nodes.send() and contested(diagnostics) == (
+        *SEVERAL, 'left: ~/torque/left of /other and ~/torques of /one'))
+
+
+@pytest.mark.parametrize('mode', ['realtime', 'lockstep'])
+def test_nodes_that_command_different_shafts_are_fine(ros, nodes, mode):
+    node = ros.differential(mode=mode)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    nodes.torques('one', ['left', 'pinion'], [1, math.nan])
+    nodes.torques('other', ['right'], [1])
+    if mode == 'realtime':
+        nodes.publisher('engine', Float64, '/differential/torque/pinion', Float64(data=2.0))
+    ros.until(lambda: nodes.send() and node.plant.inputs.received > 30)
+    first = len(diagnostics)
+    ros.until(lambda: nodes.send() and len(diagnostics) > first + 5)
+    assert all(contested([message]) in (FINE, (None, '', None)) for message in diagnostics)
+
+
+def test_a_source_that_is_replaced_or_starts_anew_fights_with_nobody():
+    sources = Sources(['left'], {}, None)
+    for number in (7, 8, 1, 2):
+        sources.note([0], True, number)
+        assert sources.contested() == {}
+    for _ in range(5):   # and seconds later
+        assert sources.contested() == {}
+    for _ in range(5):
+        sources.note([0], False, None)
+        assert sources.contested() == {}
 
 
 def test_two_nodes_of_one_name_both_run_and_both_say_so(ros):
