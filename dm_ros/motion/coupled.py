@@ -301,7 +301,7 @@ class Part(NamedTuple):
 
     here: At
     there: At
-    J: np.ndarray | None
+    J: 'np.ndarray | None'
     c: np.ndarray
     h: float
     exponential: Exponential | None

@@ -45,9 +45,11 @@ A vehicle differential in real time: torques in as topics, speeds and internal m
 Where it has clutches (lsd_*, and symmetric_* with friction surfaces) axial forces press them.
 
   in   ~/torque/<shaft>     std_msgs/Float64          N m, one shaft
+       ~/speed/<shaft>      std_msgs/Float64          rad/s, outside one with a speed port
        ~/clutch/<clutch>    std_msgs/Float64          N, axial force on one clutch
        ~/torques            sensor_msgs/JointState    N m and N as effort, any shafts and
-                                                      clutches (<clutch>_clutch) by name
+                                                      clutches (<clutch>_clutch) by name;
+                                                      velocity of speed ports
   out  ~/joint_states       sensor_msgs/JointState    all shafts: rad, rad/s, N m
        ~/internal_moments   sensor_msgs/JointState    N m as effort
        ~/clutches           sensor_msgs/JointState    slip in rad and rad/s, force in N
@@ -57,6 +59,7 @@ Where it has clutches (lsd_*, and symmetric_* with friction surfaces) axial forc
        ~/pause              std_srvs/SetBool
 
   --ros-args -p variant:=lsd_ode -p rate:=500.0
+  --ros-args -p port.left.kind:=speed
   --ros-args --params-file lsd.yaml -p variant:=lsd_dae
 
 ros2 param list /differential names all parameters, ros2 param describe tells of each.

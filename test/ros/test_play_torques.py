@@ -101,7 +101,7 @@ def test_a_log_is_played_from_its_begin_and_what_it_loses_is_told(tmp_path, caps
     file.write_text('time,gear,pinion,left,right\n' + ''.join(
         f'{1748873654 + n / 1000:.3f},D,{n},-1,-1\n' for n in range(101)))
     arguments = parser().parse_args(['--torques', str(file), '--ignore-columns', 'gear'])
-    _, torques_at, count = load(arguments)
+    _, _, torques_at, count, _ = load(arguments)
     assert [torques_at(n)[0] for n in range(count)] == list(range(0, 100, 10))
     begin, lost = capsys.readouterr().err.splitlines()
     assert begin.startswith(f'play_torques: {file}: time 0 is 1748873654.0 s in the file')
