@@ -10,6 +10,7 @@ grows; a bisection finds where the one turns into the other. ``coupling_speed`` 
 speeds are exchanged.
 """
 
+import argparse
 from dataclasses import replace
 import sys
 
@@ -209,6 +210,8 @@ def chatter(rate, seconds=1.5):
 
 def main():
     """Print the tables."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     for line in tables():
         print(line)
     return 0

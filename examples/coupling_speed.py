@@ -10,6 +10,7 @@ tick or one tick late. The push dies out or it grows; a bisection finds where th
 the other.
 """
 
+import argparse
 import sys
 
 from coupling import attached, GEAR, half_shaft, late, limit, tyre
@@ -210,6 +211,8 @@ def joules(energy):
 
 def main():
     """Print the tables."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     for line in tables():
         print(line)
     return 0

@@ -8,6 +8,7 @@ Prints the tables of doc/example.md: by how much the two differ in the four case
 does at a rate that is too low for the tyre.
 """
 
+import argparse
 from dataclasses import replace
 import math
 import sys
@@ -100,6 +101,8 @@ def rate_row(rate, runs, references):
 
 def main():
     """Print the tables."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     for line in tables():
         print(line)
     return 0
