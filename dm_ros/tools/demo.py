@@ -62,8 +62,8 @@ def positive(text):
 def folder_for_results(path):
     """Make a folder, and take it away if nothing came into it."""
     made = [folder for folder in (path, *path.parents) if not folder.exists()]
-    path.mkdir(parents=True, exist_ok=True)
-    try:
+    try:   # from before it is there, since a signal may come at any moment
+        path.mkdir(parents=True, exist_ok=True)
         yield
     finally:
         with suppress(OSError):   # it is not empty
@@ -173,12 +173,12 @@ def run(arguments):
     """Do what the command line says; raise OSError, RuntimeError or ValueError where it fails."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     simulation, values = simulation_of(arguments)
-    with folder_for_results(arguments.out):
-        try:
+    try:
+        with folder_for_results(arguments.out):
             run_and_write(arguments, simulation, values)
-        except Signalled:
-            print('demo: ended by a signal, the record is not whole', file=sys.stderr)
-            raise
+    except Signalled:
+        print('demo: ended by a signal, the record is not whole', file=sys.stderr)
+        raise
 
 
 def run_and_write(arguments, simulation, values):
