@@ -18,10 +18,12 @@ import numpy as np
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.energy import AuditedSimulation
+from dm_ros.mechanism.variants import SELF_LOCKING, SYMMETRIC, variant_named
 from dm_ros.motion.models import LOSS_LAWS
 
 DT, START = 1e-3, (50.0, 49.0)
 SHAFT = 1e4, 100.0   # N m/rad, N m s/rad
+DRIVING = {SYMMETRIC.name: 30.0, SELF_LOCKING.name: 200.0}   # N m
 
 
 def loads(ticks, driving):
@@ -55,10 +57,10 @@ def main():
     for kind, word in ((Simulation, 'step'), (AuditedSimulation, 'step with books')):
         for law in LOSS_LAWS:
             for variant in VARIANTS:
-                is_lsd = variant.startswith('lsd')
+                driving = DRIVING[variant_named(variant).mechanism.name]
                 options = {'loss_law': law, 'initial_velocity': START}
                 ports = dict.fromkeys(kind(variant).outputs, SHAFT)
-                inputs = loads(arguments.ticks, 200.0 if is_lsd else 30.0)
+                inputs = loads(arguments.ticks, driving)
                 recorded = kind(variant, DT, ports=ports, **options)
                 torques = [recorded.step(values).torque for values in inputs['calm']]
                 times = {'torque': [], 'calm': [], 'wild': []}

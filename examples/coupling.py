@@ -12,7 +12,6 @@ speeds are exchanged.
 
 import argparse
 from dataclasses import replace
-import sys
 
 from brake_lock import CASES, law_of, parameters_of, PLATES, VARIANT
 from car import CarParameters, with_wheels_and_engine
@@ -208,14 +207,14 @@ def chatter(rate, seconds=1.5):
     return float((steps[1:] * steps[:-1] < 0.0).mean())
 
 
-def main():
-    """Print the tables."""
+def print_tables(description, tables):
+    """Print the lines that a function makes, or the help."""
     argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     for line in tables():
         print(line)
-    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    print_tables(__doc__, tables)

@@ -10,10 +10,7 @@ tick or one tick late. The push dies out or it grows; a bisection finds where th
 the other.
 """
 
-import argparse
-import sys
-
-from coupling import attached, GEAR, half_shaft, late, limit, tyre
+from coupling import attached, GEAR, half_shaft, late, limit, print_tables, tyre
 from coupling import grows as grows_by_torque
 import numpy as np
 from wheel import Wheel
@@ -209,14 +206,5 @@ def joules(energy):
     return f'{energy:.1f}' if abs(energy) > 0.05 else 'below 0.1'
 
 
-def main():
-    """Print the tables."""
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    for line in tables():
-        print(line)
-    return 0
-
-
 if __name__ == '__main__':
-    sys.exit(main())
+    print_tables(__doc__, tables)

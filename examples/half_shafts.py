@@ -8,13 +8,12 @@ Prints the tables of doc/example.md: by how much the two differ in the four case
 does at a rate that is too low for the tyre.
 """
 
-import argparse
 from dataclasses import replace
 import math
-import sys
 
 from brake_lock import CASES, run, SPEED, TORQUE
 from car import CarParameters
+from coupling import print_tables
 import numpy as np
 
 SECONDS, SETTLED = 5.0, 1.0   # s, of a run, and until the half-shafts have wound up
@@ -99,14 +98,5 @@ def rate_row(rate, runs, references):
     return f'| {rate:.0f} | {" | ".join(cells)} |'
 
 
-def main():
-    """Print the tables."""
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    for line in tables():
-        print(line)
-    return 0
-
-
 if __name__ == '__main__':
-    sys.exit(main())
+    print_tables(__doc__, tables)

@@ -18,8 +18,8 @@ import sys
 
 from car import LimitedSlip
 from car_nodes import EVERY_MESSAGE
-import rclpy
 from rclpy.node import Node
+from run_node import run
 from sensor_msgs.msg import JointState
 
 
@@ -50,17 +50,7 @@ class LimitedSlipNode(Node):
 
 def main(args=None):
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    rclpy.init(args=args)
-    try:
-        rclpy.spin(LimitedSlipNode())
-    except KeyboardInterrupt:
-        pass
-    except Exception:
-        if rclpy.ok():   # otherwise it is the shutdown, which may break a call
-            raise
-    finally:
-        rclpy.try_shutdown()
-    return 0
+    return run(LimitedSlipNode, args)
 
 
 if __name__ == '__main__':

@@ -17,8 +17,8 @@ freely.
 import sys
 
 from car_nodes import EVERY_MESSAGE
-import rclpy
 from rclpy.node import Node
+from run_node import run
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from wheel import Wheel
@@ -67,17 +67,7 @@ class WheelNode(Node):
 
 def main(args=None):
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    rclpy.init(args=args)
-    try:
-        rclpy.spin(WheelNode())
-    except KeyboardInterrupt:
-        pass
-    except Exception:
-        if rclpy.ok():   # otherwise it is the shutdown, which may break a call
-            raise
-    finally:
-        rclpy.try_shutdown()
-    return 0
+    return run(WheelNode, args)
 
 
 if __name__ == '__main__':
