@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test test-long lint bench bench-loop soak compare docs colcon test-jazzy-versions clean
+.PHONY: help setup run test test-long lint bench bench-loop bench-restarts soak compare docs colcon test-jazzy-versions clean
 
 PYTHON = python3
 VARIANT = symmetric_ode
@@ -89,6 +89,9 @@ bench: .venv-bench/done  ## measure what a step costs, beside other tools, and h
 
 bench-loop: setup  ## measure how the node holds its rate, beside a loop in C: BENCH_ARGS
 	.venv/bin/python bench/loop.py $(BENCH_ARGS)
+
+bench-restarts: setup  ## measure what subscribers that are killed cost the node, by transport: BENCH_ARGS
+	.venv/bin/python bench/restarts.py $(BENCH_ARGS)
 
 soak: setup  ## run the node for an hour, or DURATION s, and look at memory and rate
 	.venv/bin/python bench/soak.py $(if $(filter command line,$(origin DURATION)),--duration $(DURATION))

@@ -24,6 +24,7 @@ setup(
         (f'share/{NAME}/config', glob('config/*.yaml') + glob('config/*.xml')),
         (f'share/{NAME}/config/presets', glob('config/presets/*.yaml')),
     ],
+    package_data={NAME: ['ros/*.xml']},
     zip_safe=True,
     python_requires='>=3.11',
     install_requires=['numpy>=1.26', 'scipy>=1.11', 'PyYAML', 'tqdm'],

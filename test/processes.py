@@ -87,6 +87,11 @@ class Forked:
             assert time.monotonic() < end and self.returncode is None, self.errors
             time.sleep(0.01)
 
+    @property
+    def pid(self):
+        """Its process id."""
+        return self._process.pid
+
     def send_signal(self, number):
         """Send it a signal."""
         os.kill(self._process.pid, number)

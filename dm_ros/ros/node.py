@@ -24,7 +24,6 @@ from dm_ros.motion.pacing import Pacer
 from dm_ros.plant import Plant
 from dm_ros.ros.diagnostics import Diagnostics
 from dm_ros.ros.graph import Neighbours
-from dm_ros.ros.leftovers import remove_leftovers
 from dm_ros.ros.loops import (
     ask_for_priority,
     Control,
@@ -37,6 +36,7 @@ from dm_ros.ros.parameters import declare_all
 from dm_ros.ros.services import Requests
 from dm_ros.ros.strays import strays
 from dm_ros.ros.topics import Inputs, Outputs
+from dm_ros.ros.transport import prefer_udp
 
 SWITCH_INTERVAL = 1e-4   # s that the loop waits at most for a service to let go of the interpreter
 
@@ -218,7 +218,7 @@ def started(args):
         os.environ['HOME'] = home   # where rclpy has its logs
     try:
         parser().parse_args(remove_ros_args(args)[1:])
-        remove_leftovers()
+        prefer_udp()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = DifferentialNode()
         for line in strays(args, node.get_fully_qualified_name()):

@@ -26,6 +26,7 @@ from dm_ros.mechanism.variants import (
     VARIANTS,
     WITH_CLUTCHES,
 )
+from dm_ros.ros.transport import prefer_udp
 from dm_ros.settings import NodeParameters, port_parameters, speed_ports
 from dm_ros.tools.passed_over import warn
 from dm_ros.tools.progress import progress
@@ -198,6 +199,7 @@ def run(args):
     player = None
     try:
         arguments = parser().parse_args(remove_ros_args(args)[1:])
+        prefer_udp()
         # rclpy's own handlers would shut down before the zero torques are out
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node('play_torques')

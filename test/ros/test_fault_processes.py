@@ -5,7 +5,6 @@
 
 from contextlib import ExitStack, suppress
 import ctypes
-import fcntl
 import os
 from pathlib import Path
 import re
@@ -17,10 +16,12 @@ import time
 
 from processes import command, Forked, PATIENCE
 import pytest
+import rclpy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from dm_ros.files.record import Record
+from dm_ros.ros.transport import prefer_udp, RANGE
 from dm_ros.testing import DirectDifferential
 
 ROOT = Path(__file__).parents[2]
@@ -140,36 +141,76 @@ def kill_and_restart(ros, fork, times):
     return process
 
 
-def orphans():
-    """Return the locks of shared memory that no living process holds."""
-    found = set()
-    for path in Path('/dev/shm').glob('fastrtps_*_el'):
-        if re.fullmatch('fastrtps_[0-9a-f]{16}_el', path.name):
-            try:
-                with open(path) as file:
-                    fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-                    found.add(path)
-            except OSError:   # somebody holds it, or it is gone
-                continue
-    return found
+def shared_memory(pid):
+    """Return the names of the shared memory of DDS that a process uses."""
+    maps = Path(f'/proc/{pid}/maps').read_text()
+    return set(re.findall(r'/dev/shm/(fastrtps_\w+)', maps))
 
 
-@pytest.mark.skipif(not os.path.isdir('/dev/shm'), reason='needs /dev/shm')
-def test_killed_and_restarted_it_runs_and_clears_what_the_killed_left(ros, fork):
-    kill_and_clear(ros, fork, 2)
+def udp_ports(pid):
+    """Return the UDP ports that a process is bound to."""
+    inodes = set()
+    for link in Path(f'/proc/{pid}/fd').iterdir():
+        with suppress(FileNotFoundError):
+            inodes.add(os.readlink(link))
+    rows = [line.split() for line in Path('/proc/net/udp').read_text().splitlines()[1:]]
+    return {int(row[1].split(':')[1], 16) for row in rows if f'socket:[{row[9]}]' in inodes}
 
 
-def kill_and_clear(ros, fork, times):
-    """Kill and restart so often; what the killed left in /dev/shm goes with a later start."""
-    assert kill_and_restart(ros, fork, times).ended(signal.SIGTERM) == 0
-    left = orphans()
-    for path in left:   # as if the last kills were some time ago
-        with suppress(FileNotFoundError):   # somebody else's node was faster
-            os.utime(path, (0, 0))
-    process = fork(NODE)
-    process.says('at 200 Hz')
+def heard_by(ros, process):
+    """Wait until this process, with shared memory, hears another one, and is heard by it."""
+    joints = hear(ros, JointState, '/differential/joint_states')
+    torque = ros.node.create_publisher(Float64, '/differential/torque/left', 1)
+
+    def answered():
+        torque.publish(Float64(data=2.0))
+        return any(message.effort[1] == 2.0 for message in joints)
+    until(ros, answered, process)
+
+
+@pytest.mark.skipif(not os.path.isdir('/proc/self/fd'), reason='needs /proc')
+@pytest.mark.parametrize('discovery', ['LOCALHOST', 'SUBNET'])
+def test_it_uses_no_shared_memory_which_a_killed_subscriber_would_block(ros, fork, discovery):
+    process = fork(NODE, env={**os.environ, RANGE: discovery})
+    heard_by(ros, process)
+    assert not shared_memory(process.pid)
+    # the profile for this host opens no door that the middleware has not for LOCALHOST
+    multicast = 7400 + 250 * ros.domain
+    assert (multicast in udp_ports(process.pid)) is (discovery == 'SUBNET')
+
+
+@pytest.mark.skipif(not os.path.isdir('/proc/self/fd'), reason='needs /proc')
+@pytest.mark.parametrize('choice', ['transport', 'profile', 'file', 'peers'])
+def test_a_transport_that_its_user_chose_stays(ros, fork, tmp_path, choice):
+    profiles = tmp_path / 'DEFAULT_FASTRTPS_PROFILES.xml'
+    if choice in ('profile', 'file'):
+        profiles.write_text('<profiles xmlns="http://www.eprosima.com/XMLSchemas/'
+                            'fastRTPS_Profiles"><participant profile_name="mine"/></profiles>')
+    chosen = {'transport': {'FASTDDS_BUILTIN_TRANSPORTS': 'DEFAULT'},
+              'profile': {'FASTRTPS_DEFAULT_PROFILES_FILE': str(profiles)},
+              'file': {}, 'peers': {'ROS_STATIC_PEERS': '127.0.0.1'}}[choice]
+    process = fork(NODE, env={**os.environ, **chosen},
+                   folder=tmp_path if choice == 'file' else None)
+    heard_by(ros, process)
+    assert shared_memory(process.pid)
+
+
+def test_another_middleware_than_fast_dds_is_left_alone(monkeypatch):
+    monkeypatch.setattr(rclpy, 'get_rmw_implementation_identifier', lambda: 'rmw_cyclonedds_cpp')
+    environment = {RANGE: 'LOCALHOST'}
+    prefer_udp(environment)
+    assert environment == {RANGE: 'LOCALHOST'}
+
+
+def test_killed_and_restarted_it_runs_and_leaves_nothing_behind(ros, fork):
+    kill_again_and_again(ros, fork, 2)
+
+
+def kill_again_and_again(ros, fork, times):
+    """Kill and restart so often; there is no shared memory that a killed one would leave."""
+    process = kill_and_restart(ros, fork, times)
+    assert not shared_memory(process.pid)
     assert process.ended(signal.SIGTERM) == 0
-    assert not [path for path in left if path.exists()]
 
 
 # Floods
@@ -247,6 +288,7 @@ import types
 import numpy
 from dm_ros.files.columns import column_names
 from dm_ros.files.record import Record
+from dm_ros.ros.transport import prefer_udp, RANGE
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.tools import demo
 rows = numpy.tile(numpy.arange(int(sys.argv[1])) / 7, (len(column_names(SYMMETRIC)), 1)).T
