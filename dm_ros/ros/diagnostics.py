@@ -10,6 +10,7 @@ from std_msgs.msg import Header
 
 from dm_ros.motion.energy import AuditedSimulation, rated_efficiency
 from dm_ros.plant import Condition
+from dm_ros.ros.graph import in_words
 
 
 def status(node, part, complaints, fine, values):
@@ -43,9 +44,14 @@ class Diagnostics:
     def __init__(self, node):
         self._node, log = node, node.get_logger()
         self.missing = Condition('ticks are missed', log)
+        self.waiting = Condition('waiting for /clock', log)
+        self.set_back = Condition('/clock goes back', log)
+        self.driven = Condition('several publishers drive /clock', log)
         self.misfitting = Condition('QoS does not fit', log)
         self.contested = Condition('several sources command one shaft or clutch', log)
+        self.unheard = Condition('nobody hears a topic', log)
         self.ambiguous = Condition('another node has the same name', log)
+        self._conditions = [part for part in vars(self).values() if isinstance(part, Condition)]
         self._before = 0, time.monotonic_ns()
 
     def report(self, stamp):
@@ -59,9 +65,13 @@ class Diagnostics:
         if isinstance(plant.simulation, AuditedSimulation):
             statuses.append(self._energy())
         plant.settle()
-        for condition in (self.missing, self.misfitting, self.contested, self.ambiguous):
+        for condition in self._conditions:
             condition.settle()
         return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
+
+    def clock_went_back(self, before, now):
+        """Notice that ``/clock`` went back, from one time to another, ns."""
+        self.set_back.happened(f'from {before * 1e-9:.3f} s to {now * 1e-9:.3f} s')
 
     def _status(self, part, complaints, fine, values):
         return status(self._node.get_fully_qualified_name(), part, complaints, fine, values)
@@ -71,8 +81,10 @@ class Diagnostics:
         ticks, now = plant.ticks, time.monotonic_ns()
         (ticks_before, before), self._before = self._before, (ticks, now)
         running = 'running' if self._node.control.running.is_set() else 'paused'
+        clock = self._clock() if self._node.follows_clock or self._node.drives_clock else {}
         return self._status(
-            'loop', active(self.missing, plant.coarse, plant.out_of_range), running, {
+            'loop', active(self.waiting, self.driven, self.set_back, self.missing, plant.coarse,
+                           plant.out_of_range), running, {
                 'variant': plant.simulation.variant,
                 'rate wanted [Hz]': f'{1.0 / plant.simulation.dt:g}',
                 'rate held [Hz]': f'{(ticks - ticks_before) / (now - before) * 1e9:.2f}',
@@ -81,7 +93,18 @@ class Diagnostics:
                 'missed ticks': pacer.missed,
                 'refused ticks': plant.out_of_range.count,
                 'coarse solver steps': plant.coarse.count,
-                'simulated time [s]': f'{plant.simulation.time:.9g}'})
+                'simulated time [s]': f'{plant.simulation.time:.9g}',
+                **clock})
+
+    def _clock(self):
+        """Notice what is wrong with /clock, and return who drives it."""
+        drivers = self._node.neighbours.publishers('/clock')
+        names = in_words(drivers) or 'nobody'
+        if len(drivers) > 1:
+            self.driven.happened(names)
+        if self._node.follows_clock and not self._node.get_clock().now().nanoseconds:
+            self.waiting.happened(f'use_sim_time is set, and {names} publishes it')
+        return {'/clock driven by': names}
 
     def _torques(self):
         plant = self._node.plant
@@ -109,17 +132,24 @@ class Diagnostics:
         misfits = '; '.join(f'{t}: {what}' for t, what in self._node.neighbours.misfits().items())
         contested = '; '.join(
             f'{port}: {who}' for port, who in self._node.inputs.sources.contested().items())
+        unheard = '; '.join(
+            f'{topic} of {who}' for topic, who in self._node.neighbours.unheard().items())
         namesakes = self._node.neighbours.namesakes()
         if misfits:
             self.misfitting.happened(misfits)
         if contested:
             self.contested.happened(contested)
+        if unheard:
+            heard = ', '.join(self._node.neighbours.heard)
+            self.unheard.happened(f'{unheard}; the node hears {heard}')
         if namesakes:
             self.ambiguous.happened(f'{namesakes} more')
         return self._status(
-            'connections', active(self.misfitting, self.contested, self.ambiguous), 'fine', {
+            'connections',
+            active(self.misfitting, self.contested, self.unheard, self.ambiguous), 'fine', {
                 'QoS that does not fit': misfits or 'none',
                 'commanded by several sources': contested or 'none',
+                'topics that nobody hears': unheard or 'none',
                 'other nodes of the same name': namesakes})
 
     def _energy(self):

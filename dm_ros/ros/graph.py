@@ -1,10 +1,15 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who else is on a node's topics: those whose QoS does not fit, and nodes of the same name."""
+"""Who else is on a node's topics: those who do not fit, and nodes of the same name."""
+
+from collections import Counter
 
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.qos import qos_check_compatible, qos_policy_name_from_kind, QoSCompatibility
+
+UNKNOWN = '_NODE_NAME_UNKNOWN_'   # as rmw has it
+INPUTS = '~/torque/', '~/speed/', '~/clutch/'   # what the topics of single ports begin with
 
 
 class Neighbours:
@@ -20,6 +25,7 @@ class Neighbours:
         self._node = node
         self._told = {}      # {topic: policy}
         self._watched = {}
+        self.heard = {}      # {topic: message type} of the inputs of the node
 
     def of_publisher(self, topic):
         """Return the event callbacks for a publisher of the node."""
@@ -41,8 +47,34 @@ class Neighbours:
 
     def publishers(self, topic):
         """Return the full names of the nodes of all publishers of a topic."""
-        return [full_name(endpoint) for endpoint in self._node.get_publishers_info_by_topic(
-            self._node.resolve_topic_name(topic))]
+        return [full_name(one) for one in self._named(self._node.resolve_topic_name(topic))]
+
+    def _named(self, topic):
+        """Return the publishers of a topic; one that has just come has its name a bit later."""
+        return [one for one in self._node.get_publishers_info_by_topic(topic)
+                if one.node_name != UNKNOWN]
+
+    def unheard(self):
+        """
+        Return ``{topic: nodes}`` of what others publish for the node and it does not take.
+
+        That is on topics like those of its inputs, such as of a shaft that it has not, or of any
+        shaft in lockstep, and messages of another type.
+        """
+        node, found = self._node, {}
+        own = tuple(node.get_fully_qualified_name() + part.removeprefix('~') for part in INPUTS)
+        heard = {node.resolve_topic_name(topic): kind for topic, kind in self.heard.items()}
+        for topic, types in node.get_topic_names_and_types():
+            if topic in heard:
+                wrong = sorted(set(types) - {heard[topic]})
+            else:
+                wrong = types if topic.startswith(own) else []
+            names = wrong and [full_name(one) for one in self._named(topic)
+                               if one.topic_type in wrong]
+            if names:
+                found[topic] = in_words(names) + (
+                    f' as {", ".join(wrong)} instead of {heard[topic]}' if topic in heard else '')
+        return found
 
     def namesakes(self):
         """Return the number of other nodes of the same full name."""
@@ -64,3 +96,9 @@ class Neighbours:
 def full_name(endpoint):
     """Return the full name of the node of an endpoint."""
     return f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}'
+
+
+def in_words(names):
+    """Return names once each, with their number where they come several times."""
+    return ', '.join(f'{name} ({count})' if count > 1 else name
+                     for name, count in sorted(Counter(names).items()))

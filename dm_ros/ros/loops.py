@@ -55,15 +55,19 @@ def follow_steady_clock(control, pacer, tick):
                 tick()
 
 
-def follow_ros_clock(control, pacer, clock, tick):
+def follow_ros_clock(control, pacer, clock, tick, set_back):
     """
     Call ``tick`` at the pacer's deadlines on a ROS clock, which another simulator drives.
 
     While it stands still nothing happens; when it jumps back the deadlines begin anew.
+
+    :param set_back: called when it jumps back, with the times before and after, ns.
     """
     before = 0
     while not control.stopping.is_set():
         now = clock.now().nanoseconds
+        if now < before:
+            set_back(before, now)
         if now < before or before == 0 or not control.running.is_set():
             pacer.restart(now)
         before = now

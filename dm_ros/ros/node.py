@@ -81,8 +81,8 @@ class DifferentialNode(Node):
         super().__init__('differential', start_parameter_services=False, **node_options)
         try:
             self.plant = Plant(declare_all(self), self.get_logger())
-            self._follows_clock = self.get_parameter('use_sim_time').value
-            if self._follows_clock and self.plant.settings.publish_clock:
+            self.use_sim_time = self.get_parameter('use_sim_time').value
+            if self.use_sim_time and self.plant.settings.publish_clock:
                 raise ValueError('publish_clock: a node that follows /clock, by use_sim_time, '
                                  'cannot drive it')
         except ValueError:
@@ -93,7 +93,7 @@ class DifferentialNode(Node):
         settings = self.plant.settings
         # another simulator's clock may leap by many ticks, but not by more than a second
         self.pacer = Pacer(1e9 / settings.rate,
-                           patience=settings.rate if self._follows_clock else 0)
+                           patience=settings.rate if self.follows_clock else 0)
         self.set_pace()
         self._failure = None
         self._thread = threading.Thread(target=self._run, name='differential loop')
@@ -119,6 +119,16 @@ class DifferentialNode(Node):
         """The simulation of the ``plant``."""
         return self.plant.simulation
 
+    @property
+    def follows_clock(self):
+        """Whether ``/clock`` advances time; in lockstep nothing but messages does."""
+        return self.use_sim_time and not self.plant.lockstep
+
+    @property
+    def drives_clock(self):
+        """Whether the node publishes ``/clock``."""
+        return self.plant.settings.publish_clock
+
     def start(self):
         """Begin to tick."""
         self._thread.start()
@@ -135,7 +145,7 @@ class DifferentialNode(Node):
     def set_pace(self):
         """Let the pacer follow the settings; the lock of ``control`` must be held."""
         settings, pacer = self.plant.settings, self.pacer
-        factor = 1.0 if self._follows_clock else settings.real_time_factor
+        factor = 1.0 if self.follows_clock else settings.real_time_factor
         period = 1e9 / (settings.rate * factor)
         if period != pacer.period:
             pacer.period = period
@@ -168,8 +178,9 @@ class DifferentialNode(Node):
                 ask_for_priority(settings.realtime_priority, self.get_logger())
             if self.plant.lockstep:
                 follow_messages(control, self.inputs.torques, self.context, self.lockstep_tick)
-            elif self._follows_clock:
-                follow_ros_clock(control, self.pacer, self.get_clock(), self._followed_tick)
+            elif self.follows_clock:
+                follow_ros_clock(control, self.pacer, self.get_clock(), self._followed_tick,
+                                 self._diagnostics.clock_went_back)
             else:
                 follow_steady_clock(control, self.pacer, self.tick)
         except Exception as error:

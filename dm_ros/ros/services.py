@@ -61,6 +61,11 @@ class Requests:
         plant = self._node.plant
         known = plant.values
         try:
+            for parameter in parameters:
+                if (parameter.name == 'use_sim_time'
+                        and parameter.value is not self._node.use_sim_time):
+                    raise ValueError('use_sim_time: it cannot be changed while it runs; give it '
+                                     'to the node at its start')
             self._prepared = plant.prepared({   # the others are those of every node
                 parameter.name: parameter.value for parameter in parameters
                 if parameter.name in known})

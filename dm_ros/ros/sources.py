@@ -3,7 +3,9 @@
 
 """Where the commands for each shaft and clutch come from, and where several sources fight."""
 
-from collections import Counter, deque
+from collections import deque
+
+from dm_ros.ros.graph import in_words
 
 WINDOW = 3   # reports in which a port has changed its source ...
 OFTEN = 2    # ... so many times if two fight over it: one change is a source that was replaced
@@ -62,9 +64,3 @@ class Sources:
         publishers = {topic: self._neighbours.publishers(topic) for topic in topics}
         return ' and '.join(f'{topic} of {in_words(names)}'
                             for topic, names in publishers.items() if names)
-
-
-def in_words(names):
-    """Return names once each, with their number where they come several times."""
-    return ', '.join(f'{name} ({count})' if count > 1 else name
-                     for name, count in sorted(Counter(names).items()))

@@ -30,6 +30,8 @@ class Inputs:
         polled = Polled()
 
         def subscription(message_type, topic, qos):
+            package, kind = message_type.__module__.split('.')[:2]
+            node.neighbours.heard[topic] = f'{package}/{kind}/{message_type.__name__}'
             return node.create_subscription(message_type, topic, never_called, qos,
                                             callback_group=polled)
         mechanism = plant.simulation.mechanism

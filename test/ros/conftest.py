@@ -30,7 +30,7 @@ class Ros:
         self.executor = SingleThreadedExecutor(context=self.context)
         self.node = rclpy.create_node('user', context=self.context)
         self.executor.add_node(self.node)
-        self._differentials = []
+        self._differentials, self._contexts = [], []
 
     def differential(self, variant='symmetric_ode', arguments=(), **parameters):
         """Start a node ``differential`` in this process, in this domain; return it."""
@@ -45,6 +45,12 @@ class Ros:
         self.executor.add_node(node)
         node.start()
         return node
+
+    def participant(self, name):
+        """Return a node that DDS takes for one of another process: in one a topic has one type."""
+        self._contexts.append(rclpy.Context())
+        rclpy.init(context=self._contexts[-1], domain_id=self.domain)
+        return rclpy.create_node(name, context=self._contexts[-1])
 
     def until(self, condition, timeout=PATIENCE):
         """Spin until the condition holds; fail when it does not in time."""
@@ -96,7 +102,8 @@ class Ros:
             node.close()
         self.executor.shutdown()
         self.node.destroy_node()
-        rclpy.shutdown(context=self.context)
+        for context in (self.context, *self._contexts):
+            rclpy.shutdown(context=context)
 
 
 @pytest.fixture

@@ -4,8 +4,12 @@
 """Whose time it is: the steady clock faster or slower, and another simulator's /clock."""
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
+from rcl_interfaces.srv import SetParameters
+import rclpy
+from rclpy.parameter import Parameter
+from reports import told
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
@@ -14,8 +18,8 @@ from std_srvs.srv import SetBool, Trigger
 class Simulator:
     """Another simulator, whose clock the test sets."""
 
-    def __init__(self, ros):
-        self.publisher = ros.node.create_publisher(Clock, '/clock', 10)
+    def __init__(self, ros, node=None):
+        self.publisher = (node or ros.node).create_publisher(Clock, '/clock', 10)
         self.ros = ros
 
     def show(self, nanoseconds, node, ticks):
@@ -86,6 +90,71 @@ def test_stamps_are_those_of_the_followed_clock(ros, follower):
 def test_it_cannot_follow_and_drive_the_clock_at_once(ros):
     with pytest.raises(ValueError, match='publish_clock'):
         ros.differential(use_sim_time=True, publish_clock=True)
+
+
+def test_without_a_clock_it_says_that_it_waits_and_for_whom(ros, capfd):
+    node = ros.differential(use_sim_time=True)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    ros.until(lambda: told(diagnostics, 'loop')[:2] == (
+        DiagnosticStatus.WARN, 'waiting for /clock'))
+    assert told(diagnostics, 'loop')[2]['/clock driven by'] == 'nobody'
+    assert ('waiting for /clock: use_sim_time is set, and nobody publishes it'
+            in capfd.readouterr().err)
+    simulator = Simulator(ros)
+    ros.until(lambda: told(diagnostics, 'loop')[2]['/clock driven by'] == '/user')
+    assert told(diagnostics, 'loop')[1] == 'waiting for /clock'
+    simulator.show(10**9, node, 0)
+    ros.until(lambda: told(diagnostics, 'loop')[:2] == (DiagnosticStatus.OK, 'running'))
+
+
+@pytest.mark.parametrize('parameters', [{'use_sim_time': True}, {'publish_clock': True}])
+def test_two_publishers_of_the_clock_are_named_until_one_goes(ros, capfd, parameters):
+    ros.differential(**parameters)
+    Simulator(ros)
+    other = rclpy.create_node('other', context=ros.context)
+    Simulator(ros, other)
+    first = '/user' if 'use_sim_time' in parameters else '/differential'
+    names = {'/other', '/user', first}
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    ros.until(lambda: told(diagnostics, 'loop')[2].get('/clock driven by')
+              == ', '.join(sorted(names)))
+    level, message, _ = told(diagnostics, 'loop')
+    assert level == DiagnosticStatus.WARN and 'several publishers drive /clock' in message
+    assert 'several publishers drive /clock: ' in capfd.readouterr().err
+    other.destroy_node()
+    if first == '/user':
+        ros.until(lambda: told(diagnostics, 'loop')[2]['/clock driven by'] == first
+                  and 'several' not in told(diagnostics, 'loop')[1])
+
+
+def test_a_clock_that_goes_back_is_told_with_the_times(ros, follower, capfd):
+    node, simulator = follower
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    simulator.show(50 * 10**9, node, 0)
+    simulator.show(2 * 10**9 + 1_000_000, node, 0)
+    ros.until(lambda: any(told([report], 'loop')[:2] == (DiagnosticStatus.WARN, '/clock goes back')
+                          for report in diagnostics))
+    assert '/clock goes back: from 50.000 s to 2.001 s\n' in capfd.readouterr().err
+    ros.until(lambda: told(diagnostics, 'loop')[:2] == (DiagnosticStatus.OK, 'running'))
+
+
+@pytest.mark.parametrize('mode', ['realtime', 'lockstep'])
+@pytest.mark.parametrize('follows', [True, False])
+def test_use_sim_time_is_refused_while_it_runs_with_the_reason(ros, follows, mode):
+    node = ros.differential(use_sim_time=follows, mode=mode)
+
+    def answer(value, **others):
+        return ros.call(SetParameters, '/differential/set_parameters', parameters=[
+            Parameter(name, value=v).to_parameter_msg()
+            for name, v in {'use_sim_time': value, **others}.items()]).results
+    refused = answer(not follows, torque_limit=7.0)
+    assert not any(result.successful for result in refused)
+    assert refused[0].reason.startswith('use_sim_time: it cannot be changed while it runs')
+    assert node.get_parameter('use_sim_time').value is follows
+    assert node.plant.settings.torque_limit == 1e5
+    assert (node.get_clock().ros_time_is_active is follows)
+    assert all(result.successful for result in answer(follows, torque_limit=7.0))
+    assert node.plant.settings.torque_limit == 7.0
 
 
 def test_a_driven_clock_goes_with_the_ticks_in_real_time_and_paused(ros, steady):

@@ -11,6 +11,7 @@ import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from reports import told
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int8
 from std_srvs.srv import SetBool, Trigger
@@ -36,14 +37,6 @@ def demand(efforts, names=NAMES):
 def load(n):
     """Return torques and forces that lock, slip and reverse."""
     return (300.0 - n % 400, -100.0 + n % 37, -150.0 + n % 91), (20.0 * (n % 50), 7.0 * (n % 3))
-
-
-def told(diagnostics):
-    """Return the newest status of the inputs as (level, message, values)."""
-    for status in (s for message in reversed(diagnostics) for s in message.status):
-        if status.name == '/differential: torques':
-            return status.level, status.message, {v.key: v.value for v in status.values}
-    return None, '', {}
 
 
 def force(node):

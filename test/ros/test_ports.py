@@ -11,6 +11,7 @@ import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from reports import told
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
@@ -30,14 +31,6 @@ PORT = {'left': (2e4, 50.0)}
 def demand(names, effort=(), velocity=()):
     return JointState(name=list(names), effort=[float(v) for v in effort],
                       velocity=[float(v) for v in velocity])
-
-
-def told(diagnostics):
-    """Return the newest status of the inputs as (level, message, values)."""
-    for status in (s for message in reversed(diagnostics) for s in message.status):
-        if status.name == '/differential: torques':
-            return status.level, status.message, {v.key: v.value for v in status.values}
-    return None, '', {}
 
 
 def twist(node):
