@@ -384,6 +384,7 @@ def test_command_reads_parameters_and_the_direction(capsys, tmp_path):
     (['--torque', 'inf'], '--torque: inf'), (['--share-to', 'rear', '120'], 'from 0 to 100'),
     (['--share-to', 'rear', 'all'], 'from 0 to 100'),
     (['--share-to', 'left', '60'], 'front, rear'),
+    (['--mechanism', 'symmetric', '--forces', '0', '10'], '--forces: there are no clutches'),
     (['--params', 'nowhere.yaml'], 'nowhere.yaml: No such')])
 def test_command_refuses_bad_input_in_one_line(arguments, message, capsys):
     assert main(arguments) == 2

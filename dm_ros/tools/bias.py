@@ -128,6 +128,9 @@ def run(arguments):
         if not 0.0 <= force < math.inf:
             raise ValueError(f'--forces: {force!r} is not allowed, it must be a number of N, '
                              'at least 0')
+    if any(arguments.forces) and not p.has_clutches:
+        raise ValueError('--forces: there are no clutches to press, '
+                         f'{p.prefix}.clutch.*.friction_surfaces are 0')
     direction = -DIRECT if arguments.reverse else DIRECT
     if arguments.share_to:
         side, percent = share_to(arguments.share_to, mechanism)
