@@ -309,8 +309,15 @@ def parser():
     return result
 
 
+def started_node(rate, variant, path):
+    """Run the node as ``differential`` does."""
+    from dm_ros.ros.transport import prefer_udp
+    prefer_udp()
+    node(float(rate), variant, Path(path))
+
+
 ROLES = {
-    'node': lambda rate, variant, path: node(float(rate), variant, Path(path)),
+    'node': started_node,
     'publisher': lambda rate, shaft: publisher(float(rate), shaft),
     'python_loop': lambda rate, s, path: python_loop(float(rate), float(s), Path(path)),
     'setter': setter,

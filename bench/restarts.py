@@ -88,13 +88,14 @@ def victims(count):
         child = os.fork()
         if not child:
             hear(told)
+        os.close(told)
         for _ in range(3):
-            os.read(ear, 1)
+            if not os.read(ear, 1):
+                raise RuntimeError('a subscriber ended by itself')
         time.sleep(random.uniform(0.0, 0.3))
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         os.close(ear)
-        os.close(told)
 
 
 ROLES = {
