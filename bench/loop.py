@@ -106,7 +106,7 @@ def watched_pacer(rate, timeline):
 
 
 def python_loop(rate, seconds, path):
-    """Run the node's loop with nothing to do, until SIGTERM at the latest."""
+    """Run the node's loop with nothing to do."""
     from dm_ros.ros.loops import Control, follow_steady_clock
     control, timeline = Control(), Timeline(path)
     end = time.monotonic() + seconds
@@ -114,7 +114,6 @@ def python_loop(rate, seconds, path):
     def tick():
         if time.monotonic() > end:
             control.stopping.set()
-    signal.signal(signal.SIGTERM, lambda *_: control.stopping.set())
     follow_steady_clock(control, watched_pacer(rate, timeline), tick)
     timeline.write()
 

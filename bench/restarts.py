@@ -7,8 +7,7 @@ The benchmark of restarts: what subscribers that are killed cost the node, by tr
 A node with the transports of the middleware, which are shared memory and UDP, and one with UDP
 alone, as ``differential`` chooses, run at the same time, each in a domain of its own. Beside each
 a subscriber of its topics is killed and started anew, again and again, and torques are sent to
-measure the round trip. A loop with no work shows when the whole machine stands still. It prints a
-Markdown table. Run ``make bench-restarts``;
+measure the round trip. It prints a Markdown table. Run ``make bench-restarts``;
 ``python bench/restarts.py --help`` has the options.
 """
 
@@ -26,20 +25,22 @@ import sys
 import tempfile
 import time
 
-from loop import node, python_loop, round_trips, Timeline
+from loop import node, round_trips, Timeline
 import numpy as np
 
 TRANSPORTS = {'both': 'shared memory and UDP', 'udp': 'UDP'}
-BLOCKED = 100e6   # ns of a publish() that count as blocked
+BLOCKED = 100e6   # ns of publishing that count as blocked
+GIVEN_UP = 334e6  # ns after which shared memory gives a dead reader up, and ...
+NEAR = 5e6        # ns from a multiple of them that count as just that
 LEGEND = """\
 `publish` is how long the node takes to publish the messages of a tick, `blocked` how often that
-took more than 100 ms, `alone` how often while a loop with no work in a process of its own went on.
-`missed` are whole periods without a tick. `CPU` is that of the node, of one core. `round trip` is
-from the publishing of a torque in another process to the arrival there of the joint state that
-carries it.
+took more than 100 ms, as on a busy machine, and `dead` how often a multiple of 334 ms, after which
+shared memory gives a dead reader up. `missed` are whole periods without a tick. `CPU` is that of
+the node, of one core. `round trip` is from the publishing of a torque in another process to the
+arrival there of the joint state that carries it.
 """
 HEAD = ['transport of the node', 'restarts', 'publish p50, us', 'p99, us', 'max, ms', 'blocked',
-        'alone', 'missed', 'CPU', 'round trip p50, ms', 'p99, ms']
+        'dead', 'missed', 'CPU', 'round trip p50, ms', 'p99, ms']
 
 
 def watched_node(transport, rate, path):
@@ -101,26 +102,21 @@ def victims(count):
 ROLES = {
     'node': lambda transport, rate, path: watched_node(transport, float(rate), Path(path)),
     'victims': lambda count: victims(int(count)),
-    'python_loop': lambda rate, path: python_loop(float(rate), 1e9, Path(path)),
     'round_trips': lambda path: round_trips('front', 1, Path(path)),
 }
 
 
-def row(transport, restarts, folder, rate, idle):
-    """Return the cells of one transport; idle: when each tick of the loop with no work began."""
+def row(transport, restarts, folder, rate):
+    """Return the cells of one transport."""
     ticks = np.frombuffer((folder / 'node').read_bytes(), dtype=np.int64).reshape(-1, 2)
-    ended, publish = np.frombuffer((folder / 'publish').read_bytes(),
-                                   dtype=np.int64).reshape(-1, 2).T
-    blocked = [(end - duration, end) for end, duration in zip(ended, publish)
-               if duration > BLOCKED]
-    # that loop went on if it stood for less than half of the time that the node was blocked
-    alone = sum(np.diff(idle[(begin < idle) & (idle < end)], prepend=begin, append=end).max()
-                < 0.5 * (end - begin) for begin, end in blocked)
+    publish = np.frombuffer((folder / 'publish').read_bytes(), dtype=np.int64)[1::2]
+    blocked = publish[publish > BLOCKED]
+    dead = abs(blocked - GIVEN_UP * np.maximum(1, np.round(blocked / GIVEN_UP))) < NEAR
     trips = np.frombuffer((folder / 'trips').read_bytes())
     cpu = json.loads((folder / 'node.json').read_text())['cpu']
     return [TRANSPORTS[transport], restarts,
             *(f'{1e-3 * q:.0f}' for q in np.quantile(publish, [0.5, 0.99])),
-            f'{publish.max() / 1e6:.1f}', len(blocked), alone,
+            f'{publish.max() / 1e6:.1f}', len(blocked), dead.sum(),
             (ticks[:, 1] * 1e-9 * rate).astype(int).sum(), f'{100 * cpu:.1f} %',
             *(f'{1e3 * q:.2f}' for q in np.quantile(trips, [0.5, 0.99]))]
 
@@ -145,8 +141,6 @@ def main():
           f'load average {os.getloadavg()[0]:.1f} before\n\n{LEGEND}')
     with ExitStack() as stack:
         folders, nodes, killers = {}, [], []
-        idle = Path(stack.enter_context(tempfile.TemporaryDirectory())) / 'idle'
-        nodes.append(subprocess.Popen([sys.executable, __file__, 'python_loop', '200', idle]))
         for transport in TRANSPORTS:
             environment = {**os.environ,
                            'ROS_DOMAIN_ID': str(stack.enter_context(own_domain()))}
@@ -164,10 +158,9 @@ def main():
             process.send_signal(signal.SIGTERM)
         for process in nodes:
             process.wait(20)
-        went_on = np.frombuffer(idle.read_bytes(), dtype=np.int64)[::2]
         print('| ' + ' | '.join(HEAD) + ' |\n|---|' + '---:|' * (len(HEAD) - 1))
         for transport, folder in folders.items():
-            cells = row(transport, arguments.count, folder, arguments.rate, went_on)
+            cells = row(transport, arguments.count, folder, arguments.rate)
             print('| ' + ' | '.join(map(str, cells)) + ' |')
 
 

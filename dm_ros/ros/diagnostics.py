@@ -102,7 +102,8 @@ class Diagnostics:
         names = in_words(drivers) or 'nobody'
         if len(drivers) > 1:
             self.driven.happened(names)
-        if self._node.follows_clock and not self._node.get_clock().now().nanoseconds:
+        if self._node.follows_clock and not (
+                drivers and self._node.get_clock().now().nanoseconds):
             self.waiting.happened(f'use_sim_time is set, and {names} publishes it')
         return {'/clock driven by': names}
 
@@ -140,7 +141,7 @@ class Diagnostics:
         if contested:
             self.contested.happened(contested)
         if unheard:
-            heard = ', '.join(self._node.neighbours.heard)
+            heard = ', '.join(self._node.neighbours.heard_topics())
             self.unheard.happened(f'{unheard}; the node hears {heard}')
         if namesakes:
             self.ambiguous.happened(f'{namesakes} more')

@@ -6,10 +6,11 @@
 from collections import Counter
 
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import qos_check_compatible, qos_policy_name_from_kind, QoSCompatibility
 
 UNKNOWN = '_NODE_NAME_UNKNOWN_'   # as rmw has it
-INPUTS = '~/torque/', '~/speed/', '~/clutch/'   # what the topics of single ports begin with
+INPUTS = '~/torques/', '~/torque/', '~/speed/', '~/clutch/'   # what its topics begin with, then /
 
 
 class Neighbours:
@@ -47,12 +48,9 @@ class Neighbours:
 
     def publishers(self, topic):
         """Return the full names of the nodes of all publishers of a topic."""
-        return [full_name(one) for one in self._named(self._node.resolve_topic_name(topic))]
-
-    def _named(self, topic):
-        """Return the publishers of a topic; one that has just come has its name a bit later."""
-        return [one for one in self._node.get_publishers_info_by_topic(topic)
-                if one.node_name != UNKNOWN]
+        found = self._node.get_publishers_info_by_topic(self._node.resolve_topic_name(topic))
+        # one that has just come has its name a bit later
+        return [full_name(one) for one in found if one.node_name != UNKNOWN]
 
     def unheard(self):
         """
@@ -61,20 +59,35 @@ class Neighbours:
         That is on topics like those of its inputs, such as of a shaft that it has not, or of any
         shaft in lockstep, and messages of another type.
         """
-        node, found = self._node, {}
+        node, wrong = self._node, {}
         own = tuple(node.get_fully_qualified_name() + part.removeprefix('~') for part in INPUTS)
-        heard = {node.resolve_topic_name(topic): kind for topic, kind in self.heard.items()}
+        heard = self.heard_topics()
         for topic, types in node.get_topic_names_and_types():
             if topic in heard:
-                wrong = sorted(set(types) - {heard[topic]})
-            else:
-                wrong = types if topic.startswith(own) else []
-            names = wrong and [full_name(one) for one in self._named(topic)
-                               if one.topic_type in wrong]
-            if names:
-                found[topic] = in_words(names) + (
-                    f' as {", ".join(wrong)} instead of {heard[topic]}' if topic in heard else '')
-        return found
+                wrong[topic] = set(types) - {heard[topic]}
+            elif f'{topic}/'.startswith(own):
+                wrong[topic] = set(types)
+        if not any(wrong.values()):
+            return {}
+        found = {}
+        for name in set(node.get_node_names_and_namespaces()):
+            for topic, types in self._published_by(*name):
+                if wrong.get(topic, set()).intersection(types):
+                    found.setdefault(topic, []).append(joined(*name))
+        return {topic: in_words(names) + (
+            f' as {", ".join(sorted(wrong[topic]))} instead of {heard[topic]}'
+            if topic in heard else '') for topic, names in sorted(found.items())}
+
+    def heard_topics(self):
+        """Return ``{full topic: message type}`` of the inputs of the node."""
+        return {self._node.resolve_topic_name(topic): kind for topic, kind in self.heard.items()}
+
+    def _published_by(self, name, namespace):
+        # get_publishers_info_by_topic would remap the topic as the node's own, whatever it says
+        try:
+            return self._node.get_publisher_names_and_types_by_node(name, namespace)
+        except NodeNameNonExistentError:   # it has just gone
+            return []
 
     def namesakes(self):
         """Return the number of other nodes of the same full name."""
@@ -95,7 +108,12 @@ class Neighbours:
 
 def full_name(endpoint):
     """Return the full name of the node of an endpoint."""
-    return f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}'
+    return joined(endpoint.node_name, endpoint.node_namespace)
+
+
+def joined(name, namespace):
+    """Return the full name of a node."""
+    return f'{namespace.rstrip("/")}/{name}'
 
 
 def in_words(names):

@@ -10,7 +10,7 @@ import rclpy
 
 CHOICES = 'FASTDDS_BUILTIN_TRANSPORTS', 'FASTRTPS_DEFAULT_PROFILES_FILE'
 PROFILES = 'DEFAULT_FASTRTPS_PROFILES.xml'   # read from the working directory
-RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+RANGE, OLD_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY'
 LOCALHOST = Path(__file__).with_name('localhost.xml')
 
 
@@ -29,8 +29,9 @@ def prefer_udp(environment=os.environ):
     if (not rclpy.get_rmw_implementation_identifier().startswith('rmw_fastrtps')
             or any(environment.get(name) for name in CHOICES) or os.path.exists(PROFILES)):
         return
-    if environment.get(RANGE) != 'LOCALHOST':
+    if environment.get(OLD_RANGE) != '1' and environment.get(RANGE) != 'LOCALHOST':
         environment['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
     elif not environment.get('ROS_STATIC_PEERS'):
         environment['FASTRTPS_DEFAULT_PROFILES_FILE'] = str(LOCALHOST)
         environment[RANGE] = 'SYSTEM_DEFAULT'   # as the profile has it
+        environment.pop(OLD_RANGE, None)        # it would count more

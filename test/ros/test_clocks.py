@@ -107,6 +107,17 @@ def test_without_a_clock_it_says_that_it_waits_and_for_whom(ros, capfd):
     ros.until(lambda: told(diagnostics, 'loop')[:2] == (DiagnosticStatus.OK, 'running'))
 
 
+def test_when_the_clock_has_gone_it_waits_again(ros):
+    node = ros.differential(use_sim_time=True)
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    simulator = Simulator(ros)
+    simulator.show(10**9, node, 0)
+    ros.until(lambda: told(diagnostics, 'loop')[1] == 'running')
+    ros.node.destroy_publisher(simulator.publisher)
+    ros.until(lambda: told(diagnostics, 'loop')[:2] == (
+        DiagnosticStatus.WARN, 'waiting for /clock'))
+
+
 @pytest.mark.parametrize('parameters', [{'use_sim_time': True}, {'publish_clock': True}])
 def test_two_publishers_of_the_clock_are_named_until_one_goes(ros, capfd, parameters):
     ros.differential(**parameters)

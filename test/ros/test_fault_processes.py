@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from dm_ros.files.record import Record
-from dm_ros.ros.transport import prefer_udp, RANGE
+from dm_ros.ros.transport import OLD_RANGE, prefer_udp, RANGE
 from dm_ros.testing import DirectDifferential
 
 ROOT = Path(__file__).parents[2]
@@ -169,9 +169,10 @@ def heard_by(ros, process):
 
 
 @pytest.mark.skipif(not os.path.isdir('/proc/self/fd'), reason='needs /proc')
-@pytest.mark.parametrize('discovery', ['LOCALHOST', 'SUBNET'])
+@pytest.mark.parametrize('discovery', ['LOCALHOST', 'SUBNET', OLD_RANGE])
 def test_it_uses_no_shared_memory_which_a_killed_subscriber_would_block(ros, fork, discovery):
-    process = fork(NODE, env={**os.environ, RANGE: discovery})
+    chosen = {OLD_RANGE: '1'} if discovery == OLD_RANGE else {RANGE: discovery}
+    process = fork(NODE, env={**os.environ, **chosen})
     heard_by(ros, process)
     assert not shared_memory(process.pid)
     # the profile for this host opens no door that the middleware has not for LOCALHOST
@@ -288,7 +289,6 @@ import types
 import numpy
 from dm_ros.files.columns import column_names
 from dm_ros.files.record import Record
-from dm_ros.ros.transport import prefer_udp, RANGE
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.tools import demo
 rows = numpy.tile(numpy.arange(int(sys.argv[1])) / 7, (len(column_names(SYMMETRIC)), 1)).T

@@ -213,22 +213,38 @@ def test_a_topic_that_nobody_hears_is_named_with_its_nodes_until_they_go(
     line = f'/differential/{topic} of /one{words}'
     ros.until(lambda: unheard(diagnostics) == (
         DiagnosticStatus.WARN, 'nobody hears a topic', line))
-    hears = '~/torques' if node.plant.lockstep else ', '.join(node.neighbours.heard)
+    hears = ', '.join(node.resolve_topic_name(heard) for heard in node.neighbours.heard)
     assert f'nobody hears a topic: {line}; the node hears {hears}\n' in capfd.readouterr().err
     nodes.close()
     ros.until(lambda: unheard(diagnostics) == FINE)
 
 
 def test_topics_of_others_and_of_another_name_are_none_of_its_business(ros, nodes):
-    ros.differential(arguments=['--ros-args', '-r', '~/torques:=/commands'])
+    ros.differential()
     diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
     for topic in ('/torque/left', '/differential_2/torque/left', '/differential/joint_states',
-                  '/differential/torques', '/differential/torque_limits'):
+                  '/differential/torque_limits', '/differential/torques_of_others'):
         nodes.elsewhere('one', Float64, topic)
-    nodes.publisher('controller', JointState, '/commands', torques(['left'], [1.0]))
-    nodes.elsewhere('other', Float64, '/commands')
-    line = '/commands of /other as std_msgs/msg/Float64 instead of sensor_msgs/msg/JointState'
+    nodes.torques('controller', [], [])
+    nodes.elsewhere('other', Float64, '/differential/torques')
+    line = ('/differential/torques of /other as std_msgs/msg/Float64 instead of '
+            'sensor_msgs/msg/JointState')
     ros.until(lambda: unheard(diagnostics)[2] == line)
+
+
+def test_what_is_remapped_is_heard_by_its_new_name_and_no_longer_by_the_old_one(
+        ros, nodes, capfd):
+    ros.differential(arguments=['--ros-args', '-r', '~/torques:=/commands',
+                                '-r', '~/torque/left:=/left'])
+    diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
+    nodes.publisher('good', Float64, '/left', Float64(data=1.0))
+    nodes.publisher('better', JointState, '/commands', torques(['right'], [1.0]))
+    nodes.elsewhere('old', Float64, '/differential/torque/left')
+    nodes.elsewhere('older', JointState, '/differential/torques')
+    ros.until(lambda: unheard(diagnostics)[2] == (
+        '/differential/torque/left of /old; /differential/torques of /older'))
+    assert ('; the node hears /differential/torque/pinion, /left, /differential/torque/right, '
+            '/commands\n') in capfd.readouterr().err
 
 
 # Names
