@@ -150,7 +150,8 @@ class Parameters:
         symbols = {name: symbol for symbol, (name, _) in self.rows().items()}
         unknown = [name for name in values if name not in symbols]
         if unknown:
-            raise ValueError(f'{unknown[0]}: there is no such parameter')
+            among = f' among {self.prefix}.*' if self.prefix else ''
+            raise ValueError(f'{unknown[0]}: there is no such parameter{among}')
         mine = {symbol: getattr(self, symbol) for symbol in symbols.values()}
         return type(self)(**{**mine, **{symbols[name]: v for name, v in values.items()}})
 
