@@ -179,7 +179,7 @@ def test_negative_ratio_and_whole_floats_are_taken():
 
 def test_unknown_name_is_refused_by_name():
     for name in ('symmetric.inertia.front', 'lsd.inertia.front', 'I_0', ''):
-        with pytest.raises(ValueError, match=f'^{name}: there is no such parameter among symmetric'):
+        with pytest.raises(ValueError, match=f'^{name}: there is no such parameter among symm'):
             SymmetricParameters().changed({name: 1.0})
 
 
