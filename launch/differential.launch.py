@@ -1,0 +1,66 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""One differential, and on request the recorder of its topics: where one ends, both end."""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.utilities import make_namespace_absolute, prefix_namespace
+
+from dm_ros.settings import NodeParameters
+
+ROWS = dict(NodeParameters().rows().values())
+# of the node, by their names
+PARAMETERS = ('variant', 'loss_law', 'rate', 'joint_prefix', 'realtime_priority')
+ARGUMENTS = {
+    'params_file': 'a parameter file for the node; what is given beside it counts before it',
+    'namespace': 'the namespace of the node',
+    'record': 'a new folder, to record the topics of the node in it by ros2 bag',
+} | {name: f'{ROWS[name].description}: {ROWS[name].allowed}; '
+           'not given: as the file, else the node has it' for name in PARAMETERS}
+RECORDED = ('differential/joint_states', 'differential/internal_moments', 'differential/clutches',
+            'differential/power_flow', 'differential/torques', '/diagnostics')
+
+
+def generate_launch_description():
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value='', description=description)
+          for name, description in ARGUMENTS.items()),
+        OpaqueFunction(function=processes)])
+
+
+def processes(context):
+    """Return the processes that the arguments ask for; an empty one is not given."""
+    given = {name: text for name, text in context.launch_configurations.items() if text}
+    namespace = make_namespace_absolute(
+        prefix_namespace(given.get('ros_namespace'), given.get('namespace', '')))
+    shown = {'output': 'screen', 'emulate_tty': True, 'on_exit': ended}
+    result = [Node(
+        package='dm_ros', executable='differential', name='differential', namespace=namespace,
+        parameters=[{name: value(name, given[name]) for name in PARAMETERS if name in given}],
+        # not in parameters, where a file that is missing is passed over with a warning
+        ros_arguments=['--params-file', given['params_file']] if 'params_file' in given else None,
+        **shown)]
+    if 'record' in given:
+        topics = [prefix_namespace(namespace, topic) for topic in RECORDED]
+        result.append(ExecuteProcess(cmd=[
+            'ros2', 'bag', 'record', '--output', given['record'], '--topics', *topics], **shown))
+    return result
+
+
+def value(name, text):
+    """Return the value of a parameter with its type; the node refuses what has another one."""
+    try:
+        typed = ROWS[name].kind(text)
+    except ValueError:
+        typed = text
+    return ParameterValue(typed, value_type=type(typed))
+
+
+def ended(event, context):
+    """End all, with exit code 1 where the process failed by itself."""
+    if event.returncode and not context.is_shutdown:
+        raise RuntimeError(f'{event.process_name} has failed: all end')
+    return Shutdown(reason=f'{event.process_name} has ended')
