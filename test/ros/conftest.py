@@ -4,17 +4,25 @@
 """Fixtures for tests over real topics: each test has its own context in its own domain."""
 
 import math
+import os
+from pathlib import Path
+import shutil
+import sys
 import time
 
+from command_line import asked
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
+from dm_ros.commands import COMMANDS
 from dm_ros.ros import loops
 from dm_ros.ros.domain import own_domain
 from dm_ros.ros.node import DifferentialNode
 
+ROOT = Path(__file__).parents[2]
+TORQUES = 'time,pinion,left,right\n0,100,-50,-50\n0.1,0,0,0\n'
 PATIENCE = 60.0   # s of real time until a condition that will come true is given up
 
 
@@ -167,3 +175,29 @@ def steady(ros, monkeypatch):
     yield clock
     ros.stop()
     clock.passes(math.inf)   # the loops see it
+
+
+@pytest.fixture
+def desk(ros, tmp_path, monkeypatch):
+    """Return a folder with what the commands need, in which the package is installed."""
+    prefix, folder = tmp_path / 'prefix', tmp_path / 'desk'
+    for name in ('config', 'launch'):
+        shutil.copytree(ROOT / name, prefix / 'share' / 'dm_ros' / name)
+    shutil.copytree(ROOT / 'config', folder / 'config')
+    for file in (ROOT / 'config').glob('*.yaml'):
+        shutil.copy(file, folder)
+    (folder / 'IN.csv').write_text(TORQUES)
+    marker = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages' / 'dm_ros'
+    marker.parent.mkdir(parents=True)
+    marker.touch()
+    executables = prefix / 'lib' / 'dm_ros'
+    executables.mkdir(parents=True)
+    for name in COMMANDS:
+        script = executables / name
+        script.write_text(f'#!/bin/sh\nexec {sys.executable} -m dm_ros.commands {name} "$@"\n')
+        script.chmod(0o755)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', os.pathsep.join(
+        [str(prefix), *filter(None, [os.environ.get('AMENT_PREFIX_PATH')])]))
+    monkeypatch.setenv('PYTHONUNBUFFERED', '1')
+    yield folder
+    asked('daemon', 'stop')

@@ -1,0 +1,63 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The launch files by the real ``ros2 launch``, where it is installed."""
+
+from command_line import has, Started
+import pytest
+from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import GetParameters
+
+pytestmark = pytest.mark.skipif(not has('launch'), reason='ros2 launch is not installed')
+KINDS = {ParameterType.PARAMETER_STRING: 'string_value',
+         ParameterType.PARAMETER_DOUBLE: 'double_value',
+         ParameterType.PARAMETER_INTEGER: 'integer_value'}
+
+
+def parameters(ros, node, *names):
+    """Return the values of parameters of a node, each with its type."""
+    values = ros.call(GetParameters, f'{node}/get_parameters', names=names).values
+    return [getattr(value, KINDS[value.type]) for value in values]
+
+
+def test_each_argument_arrives_with_the_type_of_its_parameter(ros, desk):
+    arguments = ('namespace:=car variant:=lsd_ode loss_law:=paper rate:=500 joint_prefix:=x_ '
+                 'realtime_priority:=0')
+    with Started(f'ros2 launch dm_ros differential.launch.py {arguments}', desk) as launch:
+        found = parameters(ros, '/car/differential', 'variant', 'loss_law', 'rate',
+                           'joint_prefix', 'realtime_priority')
+        assert found == ['lsd_ode', 'paper', 500.0, 'x_', 0] and type(found[2]) is float
+        launch.interrupt()
+        ros.until(launch.ended)
+        assert launch.returncode == 0, launch.text
+
+
+def test_what_is_not_given_is_as_the_file_has_it(ros, desk):
+    (desk / 'p.yaml').write_text('/**: {ros__parameters: {variant: lsd_dae, rate: 50.0}}')
+    with Started('ros2 launch dm_ros differential.launch.py params_file:=p.yaml rate:=60', desk):
+        assert parameters(ros, '/differential', 'variant', 'rate', 'loss_law') == [
+            'lsd_dae', 60.0, 'passive']
+
+
+def test_a_pair_has_two_namespaces_prefixes_and_files_and_ends_together(ros, desk):
+    for axle, rate in (('front', 50.0), ('rear', 60.0)):
+        (desk / f'{axle}.yaml').write_text(f'/**: {{ros__parameters: {{rate: {rate}}}}}')
+    with Started('ros2 launch dm_ros axle_pair.launch.py namespace:=car joint_prefix:=x_ '
+                 'front_params_file:=front.yaml rear_params_file:=rear.yaml', desk) as launch:
+        for axle, rate in (('front', 50.0), ('rear', 60.0)):
+            assert parameters(ros, f'/car/{axle}/differential', 'rate', 'joint_prefix') == [
+                rate, f'x_{axle}_']
+        launch.interrupt()
+        ros.until(launch.ended)
+        assert launch.returncode == 0, launch.text
+
+
+@pytest.mark.parametrize('argument, words', [
+    ('rate:=abc', 'rate'), ('variant:=nope', 'variant'), ('rate:=-1', 'rate'),
+    ('realtime_priority:=1.5', 'realtime_priority'), ('params_file:=none.yaml', 'none.yaml')])
+def test_what_the_node_refuses_ends_it_with_code_1_and_the_reason(ros, desk, argument, words):
+    with Started(f'ros2 launch dm_ros differential.launch.py {argument}', desk) as launch:
+        ros.until(launch.ended)
+        assert launch.returncode == 1
+        assert any('differential: error:' in line and words in line
+                   for line in launch.text.splitlines()), launch.text
