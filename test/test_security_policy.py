@@ -136,7 +136,7 @@ def started_by_make():
     commands = {name: ROOT / 'dm_ros' / f'{module.replace(".", "/")}.py'
                 for name, (module, _) in COMMANDS.items()}
     for line in recipe_lines():
-        for script in re.findall(r'\S+\.py\b', line):
+        for script in re.findall(r'python (\S+\.py)\b', line):
             yield ROOT / script, line
         for name in re.findall(r'(?:bin|lib/dm_ros)/(\w+)', line):
             if name in commands:
