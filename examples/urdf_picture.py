@@ -16,7 +16,7 @@ from dm_ros.files.urdf import urdf
 RUNS = {'symmetric_ode': ((-0.45, -0.75, -0.45), (30.0, -20.0, -60.0)),
         'lsd_ode': ((-0.60, -0.70, -0.45), (60.0, -20.0, -70.0))}   # from where; torques in N m
 TICKS = 60
-LIGHT = np.array((0.6, 0.35, 0.72))   # from where, of length 1
+LIGHT = np.array((0.45, 0.10, 0.89))   # where it comes from, of length 1
 FINER = 3   # rays across a pixel
 
 
@@ -49,7 +49,7 @@ def picture(mesh, sight, width, height):
     hit = mesh.ray.intersects_first(origins, np.broadcast_to(sight, origins.shape))
     image = np.full((width * height, 3), 255.0)
     facing = mesh.face_normals @ LIGHT
-    shade = 0.62 + 0.38 * facing
+    shade = 0.66 + 0.34 * facing
     colours = mesh.visual.face_colors[:, :3] * shade[:, None]
     image[hit >= 0] = colours[hit[hit >= 0]]
     return image.reshape(height, width, 3)

@@ -18,10 +18,10 @@ from xml.etree.ElementTree import Element, SubElement
 # rpy that turns z to where the first output shaft points: x is forward, y left, z up
 ALONG = {'left': (-pi / 2, 0.0, 0.0), 'front': (0.0, pi / 2, 0.0)}
 FORWARD = (0.0, pi / 2, 0.0)
-COLOURS = {'crown': (0.25, 0.45, 0.70), 'other_crown': (0.30, 0.60, 0.45),
+COLOURS = {'first': (0.25, 0.45, 0.70), 'second': (0.30, 0.60, 0.45),
            'satellite': (0.90, 0.60, 0.20), 'carrier': (0.62, 0.62, 0.66),
            'pinion': (0.55, 0.40, 0.65), 'line': (0.15, 0.15, 0.17), 'mark': (0.85, 0.10, 0.10)}
-SMALLEST, LARGEST = 1e-6, 1e5   # m, radii of gears that are drawn
+SMALLEST = 1e-6    # m, radius of a gear that is drawn
 MOST_PLATES = 12   # of a clutch that are drawn
 SPOKES = 8         # lines on a gear, of which one is the mark
 BARS = 4           # of the carrier
@@ -43,9 +43,9 @@ class Sizes(NamedTuple):
 def sizes(mechanism, p):
     """Return the ``Sizes`` of a ``Mechanism`` with some parameters."""
     crowns, satellite = (p.R_1, p.R_2), p.g_2s * p.R_2
-    if not (SMALLEST <= min(*crowns, satellite) and max(*crowns, satellite) <= LARGEST):
-        raise ValueError(f'gears with the radii {", ".join(f"{r:g}" for r in crowns)} and '
-                         f'{satellite:g} m are not drawn, only from {SMALLEST:g} to {LARGEST:g} m')
+    if min(*crowns, satellite) < SMALLEST:
+        raise ValueError(f'a gear with a radius of {min(*crowns, satellite):g} m is not drawn, '
+                         f'only from {SMALLEST:g} m')
     width = 0.35 * min(crowns)
     plates = [1.2 * radius for radius, n in ((p.R_F1, p.n_F1), (p.R_F2, p.n_F2)) if n]
     case = max(max(crowns) + width, *plates, 0.0)
@@ -82,8 +82,6 @@ class Link:
         """
         mass = 2.0 * inertia / radius / radius
         across = inertia / 2.0 + mass * height / 12.0 * height
-        if not (mass > 0.0 and across > 0.0):
-            raise ValueError(f'{inertia:g} kg m^2 is too little inertia for a gear of {radius:g} m')
         element = SubElement(self._element, 'inertial')
         SubElement(element, 'origin', xyz=numbers(0.0, 0.0, middle), rpy='0 0 0')
         SubElement(element, 'mass', value=numbers(mass))
@@ -212,7 +210,7 @@ def urdf(mechanism, parameters, prefix=''):
     along = ALONG[mechanism.outputs[0]]
     joint(robot, prefix, 'carrier', 'housing', (0.0, 0.0, 0.0), along)
     for k, (shaft, colour, radius) in enumerate(zip(
-            mechanism.outputs, ('crown', 'other_crown'), (p.R_F1, p.R_F2))):
+            mechanism.outputs, ('first', 'second'), (p.R_F1, p.R_F2))):
         link = Link(robot, prefix, shaft)
         link.inertial(inertia[shaft], size.crowns[k] + size.width / 2, size.width,
                       (1 - 2 * k) * (size.satellite + size.width / 2))
