@@ -62,9 +62,14 @@ def drawn_plates(surfaces):
     return min(surfaces + 1, MOST_PLATES) if surfaces else 0
 
 
-def numbers(*values):
-    """Return numbers as XML has them."""
-    return ' '.join(repr(float(value) + 0.0) for value in values)
+def exact(*values):
+    """Return numbers as XML has them, to the last bit: by them gears mesh."""
+    return ' '.join(map(repr, values))
+
+
+def brief(*values):
+    """Return numbers as XML has them, as exactly as an eye sees."""
+    return ' '.join(f'{round(value, 12) + 0.0:.6g}' for value in values)
 
 
 class Link:
@@ -83,17 +88,17 @@ class Link:
         mass = 2.0 * inertia / radius / radius
         across = inertia / 2.0 + mass * height / 12.0 * height
         element = SubElement(self._element, 'inertial')
-        SubElement(element, 'origin', xyz=numbers(0.0, 0.0, middle), rpy='0 0 0')
-        SubElement(element, 'mass', value=numbers(mass))
-        SubElement(element, 'inertia', ixx=numbers(across), ixy='0', ixz='0', iyy=numbers(across),
-                   iyz='0', izz=numbers(inertia))
+        SubElement(element, 'origin', xyz=exact(0.0, 0.0, middle), rpy='0 0 0')
+        SubElement(element, 'mass', value=exact(mass))
+        SubElement(element, 'inertia', ixx=exact(across), ixy='0', ixz='0', iyy=exact(across),
+                   iyz='0', izz=exact(inertia))
 
     def shape(self, kind, colour, xyz, rpy=(0.0, 0.0, 0.0), **size):
         """Add a box (``size``) or a cylinder along z (``radius``, ``length``), all in m."""
         visual = SubElement(self._element, 'visual')
-        SubElement(visual, 'origin', xyz=numbers(*xyz), rpy=numbers(*rpy))
+        SubElement(visual, 'origin', xyz=brief(*xyz), rpy=brief(*rpy))
         SubElement(SubElement(visual, 'geometry'), kind,
-                   {name: numbers(*values) for name, values in size.items()})
+                   {name: brief(*values) for name, values in size.items()})
         SubElement(visual, 'material', name=self._prefix + colour)
 
     def rod(self, colour, radius, start, end):
@@ -138,7 +143,8 @@ def draw_shaft(link, size, k, colour, friction_radius):
     link.disc(colour, 0.3 * size.crowns[k], way * face, way * end)
     link.gear(colour, 0.8 * size.crowns[k], way * end, way * (end + 0.4 * size.width))
     for place in plates(size, k)[::2]:
-        link.gear(colour, 1.1 * friction_radius, way * place, way * (place + 0.2 * size.width))
+        link.gear(colour, max(1.1 * friction_radius, 0.4 * size.crowns[k]), way * place,
+                  way * (place + 0.2 * size.width))
 
 
 def plates(size, k):
@@ -180,7 +186,7 @@ def joint(robot, prefix, name, parent, xyz, rpy, leader=None):
     element = SubElement(robot, 'joint', name=prefix + name, type='continuous')
     SubElement(element, 'parent', link=f'{prefix}{parent}_link')
     SubElement(element, 'child', link=f'{prefix}{name}_link')
-    SubElement(element, 'origin', xyz=numbers(*xyz), rpy=numbers(*rpy))
+    SubElement(element, 'origin', xyz=exact(*xyz), rpy=exact(*rpy))
     SubElement(element, 'axis', xyz='0 0 1')
     if leader:
         SubElement(element, 'mimic', joint=prefix + leader, multiplier='1', offset='0')
@@ -202,7 +208,7 @@ def urdf(mechanism, parameters, prefix=''):
     robot = Element('robot', name=f'{prefix}differential')
     for name, colour in COLOURS.items():
         SubElement(SubElement(robot, 'material', name=prefix + name), 'color',
-                   rgba=numbers(*colour, 1.0))
+                   rgba=brief(*colour, 1.0))
     Link(robot, prefix, 'housing')
     carrier = Link(robot, prefix, 'carrier')
     carrier.inertial(inertia['carrier'], size.ring if size.pinion else size.case, size.width)
