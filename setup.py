@@ -34,6 +34,7 @@ setup(
         'plot': [MATPLOTLIB],
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'test': ['hypothesis', 'pytest', 'pytest-xdist', MATPLOTLIB],
+        'urdf': ['yourdfpy>=0.0.56'],
     },
     entry_points={
         'console_scripts': [
@@ -43,6 +44,7 @@ setup(
             'differential = dm_ros.commands:differential',
             'play_torques = dm_ros.commands:play_torques',
             'simulate = dm_ros.commands:simulate',
+            'urdf = dm_ros.commands:urdf',
         ],
         'pytest11': ['dm_ros = dm_ros.testing.pytest_plugin'],
     },

@@ -19,6 +19,7 @@ COMMANDS = {
     'differential': ('ros.node', True),
     'play_torques': ('tools.play_torques', True),
     'simulate': ('tools.simulate', False),
+    'urdf': ('tools.describe', False),
 }
 
 
@@ -33,7 +34,7 @@ def run(name, args=None):
     return import_module(f'dm_ros.{module}').main(args)
 
 
-bias, compare_variants, demo, differential, play_torques, simulate = (
+bias, compare_variants, demo, differential, play_torques, simulate, urdf = (
     partial(run, name) for name in COMMANDS)
 
 

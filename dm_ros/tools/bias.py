@@ -106,12 +106,12 @@ def parser():
     return result
 
 
-def mechanism_of(values):
-    """Return the ``Mechanism`` that the values of a parameter file are for."""
+def mechanism_of(values, otherwise=SELF_LOCKING):
+    """Return the ``Mechanism`` that the values of a parameter file are for, if they tell."""
     if 'variant' in values:
         return variant_named(values['variant']).mechanism
     found = [m for m in MECHANISMS.values() if m.parameters.part_of(values)]
-    return found[0] if len(found) == 1 else SELF_LOCKING
+    return found[0] if len(found) == 1 else otherwise
 
 
 def run(arguments):

@@ -27,7 +27,8 @@ def quoted():
         before = []
         text = re.sub(r'\\\n\s*', '', page.read_text())
         for line in re.findall(r'^ {4,}(\S.*)', text, re.MULTILINE):
-            if line.startswith('ros2 ') and '[' not in line:   # a synopsis is none
+            ours = not re.match('ros2 (run|launch) (?!dm_ros )', line)
+            if line.startswith('ros2 ') and ours and '[' not in line:   # a synopsis is none
                 found.append((page.name, list(before), line))
             if re.match(r'\w+=|export |ros2 security ', line):
                 before.append(line)

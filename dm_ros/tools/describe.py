@@ -1,0 +1,67 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Print a URDF of a differential, made from its parameters, for robot_state_publisher."""
+
+import argparse
+import sys
+
+from dm_ros.ending import run_command
+from dm_ros.files.output import replacing
+from dm_ros.files.parameter_file import read_parameter_file
+from dm_ros.files.urdf import urdf
+from dm_ros.mechanism.variants import variant_named, VARIANTS
+from dm_ros.settings import NodeParameters
+from dm_ros.tools.bias import mechanism_of
+from dm_ros.tools.passed_over import warn
+
+EPILOG = """\
+Its joints are named as those in ~/joint_states, by which gears that are drawn mesh. Sizes follow
+the radii of the parameters, plates are drawn where there are clutches. doc/looking.md tells how to
+look at it in RViz and Foxglove.
+
+The mechanism is that of the variant, or else the only one with parameters in FILE, or that of the
+default variant of the node.
+"""
+
+
+def parser():
+    """Return the parser of the command line."""
+    result = argparse.ArgumentParser('urdf', description=__doc__, epilog=EPILOG,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument('--variant', choices=VARIANTS,
+                        help='the mechanism and its formulation; default: variant of FILE')
+    result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
+    result.add_argument('--joint-prefix', '--prefix', metavar='PREFIX',
+                        help='before all names; default: joint_prefix of FILE')
+    result.add_argument('--out', metavar='OUT.urdf', help='where it goes; default: stdout')
+    return result
+
+
+def run(arguments):
+    """Do what the command line says; raise ValueError or OSError where it cannot be done."""
+    values = read_parameter_file(arguments.params) if arguments.params else {}
+    if arguments.variant:
+        values['variant'] = arguments.variant
+    if arguments.joint_prefix is not None:
+        values['joint_prefix'] = arguments.joint_prefix
+    node = NodeParameters().changed(NodeParameters.part_of(values))
+    mechanism = mechanism_of(values, variant_named(node.variant).mechanism)
+    warn('urdf', arguments.params, values, mechanism)
+    p = mechanism.parameters().changed(mechanism.parameters.part_of(values))
+    text = urdf(mechanism, p, node.joint_prefix)
+    if arguments.out:
+        with replacing(arguments.out, 'w') as file:
+            file.write(text)
+    else:
+        print(text, end='', flush=True)
+
+
+def main(args=None):
+    """Run the tool ``urdf`` and return its exit code."""
+    arguments = parser().parse_args(args)
+    return run_command('urdf', lambda: run(arguments), arguments.out or 'stdout')
+
+
+if __name__ == '__main__':
+    sys.exit(main())
