@@ -1,10 +1,13 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""One differential, and on request the recorder of its topics: where one ends, both end."""
+"""One differential, on request with its description and a recorder; where one ends, all end."""
+
+import shlex
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
+from launch.substitutions import Command
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
@@ -17,6 +20,7 @@ PARAMETERS = ('variant', 'loss_law', 'rate', 'joint_prefix', 'realtime_priority'
 ARGUMENTS = {
     'params_file': 'a parameter file for the node; what is given beside it counts before it',
     'namespace': 'the namespace of the node',
+    'description': 'true to publish a URDF of the differential, by robot_state_publisher',
     'record': 'a new folder, to record the topics of the node in it by ros2 bag',
 } | {name: f'{ROWS[name].description}: {ROWS[name].allowed}; '
            'not given: as the file, else the node has it' for name in PARAMETERS}
@@ -43,11 +47,27 @@ def processes(context):
         # not in parameters, where a file that is missing is passed over with a warning
         ros_arguments=['--params-file', given['params_file']] if 'params_file' in given else None,
         **shown)]
+    if given.get('description') == 'true':
+        result.append(Node(
+            package='robot_state_publisher', executable='robot_state_publisher',
+            namespace=namespace, remappings=[('joint_states', 'differential/joint_states')],
+            parameters=[{'publish_frequency': 50.0, 'robot_description': ParameterValue(
+                Command(urdf_command(given)), value_type=str)}], **shown))
     if 'record' in given:
         topics = [prefix_namespace(namespace, topic) for topic in RECORDED]
         result.append(ExecuteProcess(cmd=[
             'ros2', 'bag', 'record', '--output', given['record'], '--topics', *topics], **shown))
     return result
+
+
+def urdf_command(given):
+    """Return the words of the command that prints the URDF of a node with such arguments."""
+    options = {'params_file': '--params', 'variant': '--variant', 'joint_prefix': '--joint-prefix'}
+    words = ['ros2 run dm_ros urdf']
+    for name, option in options.items():
+        if name in given:
+            words += [f' {option} ', shlex.quote(given[name])]
+    return words
 
 
 def value(name, text):

@@ -3,12 +3,31 @@
 
 """The launch files by the real ``ros2 launch``, where it is installed."""
 
+import os
+from pathlib import Path
+import sys
+
 from command_line import has, Started
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters
 
 pytestmark = pytest.mark.skipif(not has('launch'), reason='ros2 launch is not installed')
+PUBLISHER = """
+import rclpy, re
+from sensor_msgs.msg import JointState
+def heard(message):
+    node.get_logger().info(f"heard {message.name[0]} of {robot}", once=True)
+try:
+    rclpy.init()
+    node = rclpy.create_node("robot_state_publisher")
+    text = node.declare_parameter("robot_description", "").value
+    robot = re.search("robot name=.([a-z_]+)", text).group(1)
+    node.create_subscription(JointState, "joint_states", heard, 10)
+    rclpy.spin(node)
+except (KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
+    pass
+"""
 KINDS = {ParameterType.PARAMETER_STRING: 'string_value',
          ParameterType.PARAMETER_DOUBLE: 'double_value',
          ParameterType.PARAMETER_INTEGER: 'integer_value'}
@@ -37,6 +56,24 @@ def test_what_is_not_given_is_as_the_file_has_it(ros, desk):
     with Started('ros2 launch dm_ros differential.launch.py params_file:=p.yaml rate:=60', desk):
         assert parameters(ros, '/differential', 'variant', 'rate', 'loss_law') == [
             'lsd_dae', 60.0, 'passive']
+
+
+def test_the_description_is_that_of_the_node_and_turns_by_its_joints(ros, desk):
+    prefix = Path(os.environ['AMENT_PREFIX_PATH'].split(os.pathsep)[0])
+    executable = prefix / 'lib' / 'robot_state_publisher' / 'robot_state_publisher'
+    executable.parent.mkdir()
+    executable.write_text(f'#!/bin/sh\nexec {sys.executable} -c \'{PUBLISHER}\' "$@"\n')
+    executable.chmod(0o755)
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
+    (index / 'robot_state_publisher').touch()
+    (desk / 'my file.yaml').write_text('/**: {ros__parameters: {variant: lsd_ode}}')
+    with Started('ros2 launch dm_ros differential.launch.py namespace:=car description:=true '
+                 'joint_prefix:=x_ params_file:="my file.yaml"', desk) as launch:
+        ros.until(lambda: launch.ended() or 'heard ' in launch.text)
+        assert 'heard x_carrier of x_differential' in launch.text
+        launch.interrupt()
+        ros.until(launch.ended)
+        assert launch.returncode == 0, launch.text
 
 
 def test_a_pair_has_two_namespaces_prefixes_and_files_and_ends_together(ros, desk):
