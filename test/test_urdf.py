@@ -150,6 +150,12 @@ def test_the_drawn_surfaces_touch_where_the_velocities_are_compared(mechanism):
         assert first('pinion')[0] == pytest.approx(size.pinion, rel=1e-5)
         assert size.pinion == pytest.approx(
             size.ring / abs(mechanism.parameters().g_F))
+        boxes = [(vector(box.find('origin'), 'xyz'), vector(box.find('geometry/box'), 'size'))
+                 for box in robot.findall("link[@name='carrier_link']/visual")
+                 if box.find('geometry/box') is not None]
+        faces = [size.side * place[2] - shape[2] / 2 for place, shape in boxes
+                 if np.hypot(*place[:2]) == pytest.approx(size.ring, rel=1e-5)]
+        assert len(faces) == 40 and faces == pytest.approx([size.pinion] * 40, rel=1e-4)
 
 
 @pytest.mark.parametrize('prefix', PREFIXES)

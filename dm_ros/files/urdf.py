@@ -34,10 +34,19 @@ class Sizes(NamedTuple):
     satellite: float   # radius
     width: float       # of a tooth, about
     case: float        # radius of the carrier
-    packs: tuple       # where the plates of each clutch end along the axle, from the middle
+    plates: tuple      # number of those of each clutch
     ring: float        # radius of the ring gear
     pinion: float      # radius; 0 without final drive
     side: float        # +1 where the ring gear is on the side of the first output shaft, else -1
+
+    def places(self, k):
+        """Return where along the axle the plates of clutch k begin, from the middle."""
+        first = self.satellite + 1.4 * self.width
+        return [first + 0.3 * self.width * n for n in range(self.plates[k])]
+
+    def reach(self, k):
+        """Return where crown gear k and its plates end."""
+        return self.satellite + (1.5 + 0.3 * self.plates[k]) * self.width
 
 
 def sizes(mechanism, p):
@@ -49,17 +58,12 @@ def sizes(mechanism, p):
     width = 0.35 * min(crowns)
     plates = [1.2 * radius for radius, n in ((p.R_F1, p.n_F1), (p.R_F2, p.n_F2)) if n]
     case = max(max(crowns) + width, *plates, 0.0)
-    packs = tuple(satellite + width * (1.5 + 0.3 * drawn_plates(n)) for n in (p.n_F1, p.n_F2))
+    drawn = tuple(min(n + 1, MOST_PLATES) if n else 0 for n in (p.n_F1, p.n_F2))
     has_final_drive = 'final_drive' in mechanism.gears
     ring = 2.2 * case
-    return Sizes(crowns, satellite, width, case, packs, ring,
+    return Sizes(crowns, satellite, width, case, drawn, ring,
                  ring / abs(p.g_F) if has_final_drive else 0.0,
                  -copysign(1.0, p.g_F) if has_final_drive else 0.0)
-
-
-def drawn_plates(surfaces):
-    """Return how many plates of a clutch are drawn: one more than surfaces, up to a dozen."""
-    return min(surfaces + 1, MOST_PLATES) if surfaces else 0
 
 
 def exact(*values):
@@ -138,20 +142,13 @@ def draw_shaft(link, size, k, colour, friction_radius):
     """Draw output shaft k, 0 or 1, with crown gear and plates; its axis is that of the axle."""
     way = 1 - 2 * k
     face, crown = size.satellite, size.crowns[k] + size.width / 2
-    end = max(*size.packs, size.pinion + size.width) + 1.2 * max(size.crowns)
+    end = max(size.reach(0), size.reach(1), size.pinion + size.width) + 1.2 * max(size.crowns)
     link.gear(colour, crown, way * face, way * (face + size.width))
     link.disc(colour, 0.3 * size.crowns[k], way * face, way * end)
     link.gear(colour, 0.8 * size.crowns[k], way * end, way * (end + 0.4 * size.width))
-    for place in plates(size, k)[::2]:
+    for place in size.places(k)[::2]:
         link.gear(colour, max(1.1 * friction_radius, 0.4 * size.crowns[k]), way * place,
                   way * (place + 0.2 * size.width))
-
-
-def plates(size, k):
-    """Return where along the axle the plates of clutch k are, from the middle, m."""
-    first = size.satellite + 1.4 * size.width
-    count = round((size.packs[k] - size.satellite - 1.5 * size.width) / (0.3 * size.width))
-    return [first + 0.3 * size.width * n for n in range(count)]
 
 
 def draw_carrier(link, size, count):
@@ -162,7 +159,7 @@ def draw_carrier(link, size, count):
         link.rod('carrier', 0.1 * max(size.crowns), (0.0, 0.0, 0.0),
                  (size.case * cos(angle), size.case * sin(angle), 0.0))
     link.hoop('carrier', size.case, -half, half, 0.3 * size.width)
-    ends = [half if end < size.satellite + 1.6 * size.width else end for end in size.packs]
+    ends = [size.reach(k) if size.plates[k] else half for k in (0, 1)]
     if size.pinion:
         face = size.side * size.pinion
         back = face + size.side * size.width / 2
@@ -170,7 +167,7 @@ def draw_carrier(link, size, count):
         k = 0 if size.side > 0 else 1
         ends[k] = max(ends[k], abs(back))
     for k, way in enumerate((1, -1)):
-        for place in plates(size, k)[1::2]:
+        for place in size.places(k)[1::2]:
             link.gear('carrier', size.case, way * place, way * (place + 0.2 * size.width))
     for n in range(BARS):
         x, y = cos(pi / 4 + 2 * pi * n / BARS), sin(pi / 4 + 2 * pi * n / BARS)
