@@ -26,7 +26,7 @@ setup(
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
     ],
     package_data={NAME: ['ros/*.xml']},
-    zip_safe=True,
+    zip_safe=False,   # Fast DDS reads localhost.xml itself
     python_requires='>=3.11',
     install_requires=['numpy>=1.26', 'scipy>=1.11', 'PyYAML', 'tqdm'],
     extras_require={

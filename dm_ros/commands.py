@@ -19,7 +19,7 @@ COMMANDS = {
     'differential': ('ros.node', True),
     'play_torques': ('tools.play_torques', True),
     'simulate': ('tools.simulate', False),
-    'urdf': ('tools.describe', False),
+    'urdf': ('tools.urdf', False),
 }
 
 

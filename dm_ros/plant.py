@@ -57,10 +57,19 @@ class Condition:
         if self._quiet:
             self.active = False
         if self._told and self._quiet >= self.QUIET:
-            self._told = False
-            self._log.info(f'over: {self.what} ({self.count - self._before} times since it began)')
-            self._before = self.count
+            self._tell('over')
         self._settled = self.count
+
+    def end(self):
+        """Tell what was since it began, if that is not over; when nothing more will happen."""
+        if self._told:
+            self._tell('at the end')
+
+    def _tell(self, when):
+        self._told = False
+        times = self.count - self._before
+        self._log.info(f'{when}: {self.what} ({times} times since it began)')
+        self._before = self.count
 
 
 class Prepared(NamedTuple):
@@ -224,9 +233,14 @@ class Plant:
 
     def settle(self):
         """Let the conditions end that are over; to be called at 1 Hz, after ``notice``."""
-        for condition in (self.refusing, self.clamping, self.stale, self.freed,
-                          self.out_of_range, self.coarse, self.motoring):
+        for condition in self.conditions:
             condition.settle()
+
+    @property
+    def conditions(self):
+        """All that should not be and may be."""
+        return (self.refusing, self.clamping, self.stale, self.freed, self.out_of_range,
+                self.coarse, self.motoring)
 
     def _books(self):
         """Return all that was lost under the law whose losses may be gains, None if it is not."""

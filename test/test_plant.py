@@ -377,6 +377,18 @@ def test_a_condition_that_comes_and_goes_is_one_line_in_ten_seconds_with_the_cou
     assert condition.count == 84
 
 
+def test_what_is_not_over_at_the_end_is_told_once_with_its_count(log):
+    condition = Condition('ticks are missed', log)
+    condition.end()   # it never began
+    assert log.lines == []
+    for times in (2, 3):
+        condition.happened(f'{times} since the last report', times)
+    condition.end()
+    condition.end()
+    assert log.lines == ['WARN ticks are missed: 2 since the last report',
+                         'INFO at the end: ticks are missed (5 times since it began)']
+
+
 def test_conditions_of_a_plant_begin_and_end_once(log):
     plant = Plant({'rate': 100.0, 'torque_timeout': 0.05}, log)
     for torque in (float('nan'), 1e9, 1.0):

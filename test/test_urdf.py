@@ -17,7 +17,7 @@ from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.urdf import ALONG, sizes, urdf
 from dm_ros.mechanism.variants import MECHANISMS, variant_named
 from dm_ros.settings import PREFIX
-from dm_ros.tools.describe import main
+from dm_ros.tools.urdf import main
 
 ROOT = Path(__file__).parents[1]
 FILES = sorted((ROOT / 'config').rglob('*.yaml'))

@@ -57,9 +57,7 @@ class Diagnostics:
     def report(self, stamp):
         """Return the DiagnosticArray of the time since the last report; to be called at 1 Hz."""
         plant = self._node.plant
-        missed = self._node.pacer.missed - self.missing.count
-        if missed > 0:
-            self.missing.happened(f'{missed} since the last report', missed)
+        self._count_missed()
         plant.notice()
         statuses = [self._loop(), self._torques(), self._connections()]
         if isinstance(plant.simulation, AuditedSimulation):
@@ -68,6 +66,17 @@ class Diagnostics:
         for condition in self._conditions:
             condition.settle()
         return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
+
+    def end(self):
+        """Let the log tell what is not over when the node ends."""
+        self._count_missed()
+        for condition in (*self._node.plant.conditions, *self._conditions):
+            condition.end()
+
+    def _count_missed(self):
+        missed = self._node.pacer.missed - self.missing.count
+        if missed > 0:
+            self.missing.happened(f'{missed} since the last report', missed)
 
     def clock_went_back(self, before, now):
         """Notice that ``/clock`` went back, from one time to another, ns."""

@@ -166,6 +166,7 @@ class DifferentialNode(Node):
         if self._thread.is_alive():
             self._thread.join()
         self.destroy_node()
+        self._diagnostics.end()   # on stderr alone: /rosout may be gone
         if self._failure:
             raise self._failure
 

@@ -107,6 +107,14 @@ def test_a_value_of_another_type_in_a_file_as_launch_writes_it_ends_it_with_code
     assert all(word in line for word in words), line
 
 
+def test_at_its_end_it_tells_what_is_not_over(ros):
+    with start('--ros-args', '-p', 'use_sim_time:=true') as process:
+        process.says('waiting for /clock: ')
+        assert process.ended(signal.SIGTERM) == 0
+        *_, last = process.errors.strip().splitlines()
+    assert 'at the end: waiting for /clock (' in last
+
+
 @pytest.mark.parametrize('parameter, words', [
     ('symmetric.efficiency.left_mesh:=1.5', ['symmetric.efficiency.left_mesh', '1.5', '(0, 1]']),
     ('symmetric.satellite_count:=0', ['symmetric.satellite_count', '0']),
