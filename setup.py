@@ -23,6 +23,7 @@ setup(
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', glob('config/*.yaml') + glob('config/*.xml')),
         (f'share/{NAME}/config/presets', glob('config/presets/*.yaml')),
+        (f'share/{NAME}/config/ros2_control', glob('config/ros2_control/*')),
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
     ],
     package_data={NAME: ['ros/*.xml']},

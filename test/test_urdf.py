@@ -20,7 +20,8 @@ from dm_ros.settings import PREFIX
 from dm_ros.tools.urdf import main
 
 ROOT = Path(__file__).parents[1]
-FILES = sorted((ROOT / 'config').rglob('*.yaml'))
+FILES = sorted(path for folder in ('config', 'config/presets')
+               for path in (ROOT / folder).glob('*.yaml'))
 PREFIXES = ('', 'rear_', 'car/axle.2-')
 Z = np.array((0.0, 0.0, 1.0))
 
