@@ -1,9 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""
-One differential, on request with description, ros2_control and recorder; where one ends, all end.
-"""
+"""One differential, on request with description, ros2_control, recorder; all end with one."""
 
 from pathlib import Path
 import shlex
