@@ -22,6 +22,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', glob('config/*.yaml') + glob('config/*.xml')),
+        (f'share/{NAME}/config/layouts', glob('config/layouts/*')),
         (f'share/{NAME}/config/presets', glob('config/presets/*.yaml')),
         (f'share/{NAME}/config/ros2_control', glob('config/ros2_control/*')),
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
