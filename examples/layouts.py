@@ -149,7 +149,12 @@ def foxglove(mechanism, node, prefix):
                 'targetOrientation': [0, 0, 0, 1], 'fovy': 45, 'near': 0.01, 'far': 100},
             'followMode': 'follow-pose', 'followTf': f'{prefix}{FRAME}',
             'scene': {'transforms': {'showLabel': False, 'axisScale': 0}}, 'transforms': {},
-            'topics': {f'{namespace}/robot_description': {'visible': True}}, 'layers': {}},
+            'topics': {},
+            'layers': {'gears': {
+                'instanceId': 'gears', 'layerId': 'foxglove.Urdf', 'label': 'Gears',
+                'visible': True, 'frameLocked': True, 'sourceType': 'topic', 'framePrefix': '',
+                'topic': f'{namespace}/robot_description', 'displayMode': 'auto',
+                'fallbackColor': '#ffffff', 'order': 1}}},
         summary: {'minLevel': 0, 'pinnedIds': [], 'hardwareIdFilter': '',
                   'topicToRender': '/diagnostics', 'sortByLevel': True},
         details: {'topicToRender': '/diagnostics', 'selectedHardwareId': node,

@@ -11,14 +11,14 @@ from xml.etree import ElementTree
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1] / 'examples'))
+
+from layouts import charts, layouts
+
 from dm_ros.files.published import FRAME
 from dm_ros.mechanism.variants import equipped, MECHANISMS
 
-ROOT = Path(__file__).parents[1]
-FOLDER = ROOT / 'config' / 'layouts'
-sys.path.insert(0, str(ROOT / 'examples'))
-from layouts import charts, layouts
-
+FOLDER = Path(__file__).parents[1] / 'config' / 'layouts'
 # what the loaders know, and what a panel must be given
 PANELS = {
     'Plot': {'paths', 'showLegend', 'legendDisplay', 'showPlotValuesInLegend', 'showXAxisLabels',
@@ -139,5 +139,7 @@ def test_foxglove_plots_each_curve_over_the_stamps(name):
 def test_the_gears_are_seen_in_the_frame_of_the_housing(name):
     config = foxglove(name)['configById']['3D!gears']
     assert config['followTf'] == FRAME
-    assert config['topics'] == {'/robot_description': {'visible': True}}
+    (number, layer), = config['layers'].items()
+    assert layer['instanceId'] == number and layer['layerId'] == 'foxglove.Urdf'
+    assert (layer['sourceType'], layer['topic']) == ('topic', '/robot_description')
     assert 0.1 < config['cameraState']['distance'] < 2.0   # m, of gears
