@@ -46,12 +46,13 @@ class Component:
                     self.states[name, kind]   # a KeyError, where the plugin throws
                     self.states[name, kind] = values[i]
 
-    def write(self, message_type):
+    def write(self, message_type, now):
         """Return the message that a cycle publishes, None where it publishes none."""
         away = sum(abs(self.states[key] - command) for key, command in self.commands.items())
         if away <= self.threshold:   # never where one of them is NaN
             return None
         message = message_type()
+        message.header.stamp = now
         for name, interfaces in self.commanded.items():
             message.name.append(name)
             for kind in interfaces:

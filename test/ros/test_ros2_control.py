@@ -36,11 +36,12 @@ class Manager:
     def __init__(self, ros, text):
         self._ros = ros
         self.components = components(text)
-        self._publisher = ros.publisher(JointState, TORQUES, depth=1)   # as the plugin has it
-        self._states = {}
-        for component in self.components.values():
+        self._publishers, self._states = {}, {}
+        for end, component in self.components.items():
+            self._publishers[end] = ros.publisher(JointState, TORQUES, depth=1)   # as the plugin
             topic = component.parameters['joint_states_topic']
-            self._states[topic] = ros.listen(JointState, topic, qos_profile_sensor_data)
+            if topic not in self._states:
+                self._states[topic] = ros.listen(JointState, topic, qos_profile_sensor_data)
         self.shafts = self.components['']
         self.controllers = []
         self.sent = 0
@@ -58,11 +59,12 @@ class Manager:
                 component.read(heard[-1])
         for controller in self.controllers:
             controller.update()
-        sent = {}
+        sent = set()
         for end, component in self.components.items():
-            if message := component.write(JointState):
-                sent[end] = True
-                self._publisher.publish(message)
+            now = self._ros.node.get_clock().now().to_msg()
+            if message := component.write(JointState, now):
+                sent.add(end)
+                self._publishers[end].publish(message)
                 self.sent += 1
         return '' in sent
 
