@@ -120,9 +120,9 @@ def plot(chart, node, names):
         'paths': [{'value': path(curve, node, names), 'enabled': True, 'label': curve.name,
                    'color': curve.colour, 'timestampMethod': 'headerStamp', 'showLine': True,
                    'lineSize': 1.5} for curve in chart.curves],
-        'showLegend': True, 'legendDisplay': 'floating', 'showPlotValuesInLegend': True,
+        'showLegend': True, 'legendDisplay': 'left', 'showPlotValuesInLegend': True,
         'showXAxisLabels': True, 'showYAxisLabels': True, 'isSynced': True,
-        'xAxisVal': 'timestamp', 'sidebarDimension': 240, 'followingViewWidth': 30,
+        'xAxisVal': 'timestamp', 'sidebarDimension': 190,
         'lichtblickPanelTitle': chart.title, 'foxglovePanelTitle': chart.title}
     if chart.limits:
         result['minYValue'], result['maxYValue'] = chart.limits
@@ -144,7 +144,7 @@ def foxglove(mechanism, node, prefix):
     panels = {
         gears: {
             'cameraState': {
-                'perspective': True, 'distance': 0.9, 'phi': 60, 'thetaOffset': 55,
+                'perspective': True, 'distance': 0.6, 'phi': 60, 'thetaOffset': 55,
                 'target': [0, 0, 0], 'targetOffset': [0, 0, 0],
                 'targetOrientation': [0, 0, 0, 1], 'fovy': 45, 'near': 0.01, 'far': 100},
             'followMode': 'follow-pose', 'followTf': f'{prefix}{FRAME}',
