@@ -25,11 +25,12 @@ setup(
         (f'share/{NAME}/config/presets', glob('config/presets/*.yaml')),
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
     ],
-    package_data={NAME: ['ros/*.xml']},
+    package_data={NAME: ['ros/*.xml', 'watch/web/*', 'watch/web/uplot/*']},
     zip_safe=False,   # Fast DDS reads localhost.xml itself
     python_requires='>=3.11',
     install_requires=['numpy>=1.26', 'scipy>=1.11', 'PyYAML', 'tqdm'],
     extras_require={
+        'browser': ['selenium>=4.11'],
         'physics': ['mujoco>=4'],
         'plot': [MATPLOTLIB],
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
@@ -45,6 +46,7 @@ setup(
             'play_torques = dm_ros.commands:play_torques',
             'simulate = dm_ros.commands:simulate',
             'urdf = dm_ros.commands:urdf',
+            'watch = dm_ros.commands:watch',
         ],
         'pytest11': ['dm_ros = dm_ros.testing.pytest_plugin'],
     },
