@@ -25,7 +25,7 @@ ARGUMENTS = {
 } | {name: f'{ROWS[name].description}: {ROWS[name].allowed}; '
            'not given: as the file, else the node has it' for name in PARAMETERS}
 RECORDED = ('differential/joint_states', 'differential/internal_moments', 'differential/clutches',
-            'differential/power_flow', 'differential/torques', '/diagnostics')
+            'differential/power_flow_stamped', 'differential/torques', '/diagnostics')
 
 
 def generate_launch_description():

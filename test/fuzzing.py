@@ -326,7 +326,7 @@ class NodeMachine(RuleBasedStateMachine):
     @initialize(variant=st.sampled_from(VARIANTS))
     def begin(self, variant):
         self.node, self.heard, self.defaults = self.nodes[variant]
-        self.messages = 4 if self.node.simulation.clutches else 3   # of a tick
+        self.messages = len(self.node.outputs.of_a_tick)
         self.node.control.running.set()
         self.heard.clear()   # a sequence may be broken off
         self.laws = Laws(variant)
@@ -498,10 +498,8 @@ def nodes():
             stack.callback(node.close)
             node.get_logger().set_level(LoggingSeverity.FATAL)   # it has much to complain about
             messages = []
-            clutches = ('clutches',) if node.simulation.clutches else ()
-            for publisher in ('joint_states', 'internal_moments', *clutches, 'power_flow'):
-                setattr(node.outputs, publisher,
-                        Heard(getattr(node.outputs, publisher), messages))
+            node.outputs.of_a_tick[:] = [(Heard(publisher, messages), message)
+                                         for publisher, message in node.outputs.of_a_tick]
             tables = (NodeParameters(), node.simulation.parameters)
             defaults = {name: value for table in tables for name, value in table.named().items()
                         if node.has_parameter(name)

@@ -3,12 +3,12 @@
 
 """Snapshots as ROS messages, and the quality of service of topics."""
 
-from array import array
-
 from rclpy.callback_groups import CallbackGroup
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int8
+
+from dm_ros.files.published import Published
 
 OUTPUT_QOS = QoSProfile(depth=10)   # reliable, so that every subscriber hears it
 # best effort hears every publisher; several controllers may share ~/torques within a tick
@@ -38,45 +38,27 @@ def never_called(message):
 
 
 class SnapshotMessages:
-    """The messages of a tick, reused from tick to tick; ``clutches`` is None where none are."""
+    """
+    The messages of a tick, reused from tick to tick.
+
+    ``joints`` maps the last word of each topic, in the order of publication, to its JointState.
+    """
 
     def __init__(self, mechanism, prefix):
         """:param mechanism: its ``Mechanism``; prefix: before each name."""
-        shafts, moments, clutches = mechanism.shafts, mechanism.moments, mechanism.actuators
-        n = len(shafts)
-        self.joint_states = JointState(
-            name=[prefix + shaft for shaft in shafts],
-            position=[0.0] * n, velocity=[0.0] * n, effort=[0.0] * n)
-        self.internal_moments = JointState(
-            name=[prefix + moment for moment in moments], effort=[0.0] * len(moments))
-        self.clutches = JointState(
-            name=[prefix + clutch.name for clutch in clutches], position=[0.0] * len(clutches),
-            velocity=[0.0] * len(clutches), effort=[0.0] * len(clutches)) if clutches else None
+        self._published = published = Published(mechanism, prefix)
+        self.joints = {topic: JointState(name=names) for topic, names in published.names.items()}
         self.power_flow = Int8()
-        self._no_torque = dict.fromkeys(shafts, 0.0)
-        self._inputs = mechanism.inputs
-        self._carrier = shafts.index('carrier')
-        self._clutched = tuple(map(shafts.index, mechanism.clutches))
+        for message in self.joints.values():
+            message.header.frame_id = published.frame
 
     def fill(self, snapshot, seconds, nanoseconds):
         """Put a snapshot and one stamp into the messages, in place."""
-        joints, moments = self.joint_states, self.internal_moments
-        torque = {**self._no_torque, **dict(zip(self._inputs, snapshot.torque))}
-        joints.position[:] = array('d', snapshot.position)
-        joints.velocity[:] = array('d', snapshot.velocity)
-        joints.effort[:] = array('d', torque.values())
-        moments.effort[:] = array('d', snapshot.moment)
-        for stamp in (joints.header.stamp, moments.header.stamp):
-            stamp.sec, stamp.nanosec = seconds, nanoseconds
-        if clutches := self.clutches:
-            clutches.position[:] = self._slip(snapshot.position)
-            clutches.velocity[:] = self._slip(snapshot.velocity)
-            clutches.effort[:] = array('d', snapshot.clutch_force)
-            stamp = clutches.header.stamp
+        arrays = self._published.arrays(snapshot)
+        for message, (position, velocity, effort) in zip(self.joints.values(), arrays):
+            message.position[:] = position
+            message.velocity[:] = velocity
+            message.effort[:] = effort
+            stamp = message.header.stamp
             stamp.sec, stamp.nanosec = seconds, nanoseconds
         self.power_flow.data = snapshot.power_flow
-
-    def _slip(self, values):
-        """Return how far the shafts with a clutch are ahead of the carrier."""
-        carrier = values[self._carrier]
-        return array('d', [values[i] - carrier for i in self._clutched])

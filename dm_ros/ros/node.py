@@ -54,6 +54,7 @@ Where it has clutches (lsd_*, and symmetric_* with friction surfaces) axial forc
        ~/internal_moments   sensor_msgs/JointState    N m as effort
        ~/clutches           sensor_msgs/JointState    slip in rad and rad/s, force in N
        ~/power_flow         std_msgs/Int8             +1 direct, -1 reverse
+       ~/power_flow_stamped sensor_msgs/JointState    the same as position, with its stamp
        /diagnostics         diagnostic_msgs/DiagnosticArray
   srv  ~/reset ~/step       std_srvs/Trigger
        ~/pause              std_srvs/SetBool

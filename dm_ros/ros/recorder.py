@@ -8,7 +8,6 @@ import numpy as np
 import rclpy
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Int8
 
 from dm_ros.files.record import Record
 from dm_ros.ros.messages import never_called, Polled
@@ -21,8 +20,7 @@ class Recorder:
     """
     A recorder in a ROS context of its own; call ``poll`` more often than ``DEEP_QOS`` overflows.
 
-    A row is a tick: the messages with its stamp, and the power flow that was sent after them
-    and before the joint states of the next tick.
+    A row is a tick: the messages with its stamp.
     """
 
     def __init__(self, node, mechanism):
@@ -41,7 +39,7 @@ class Recorder:
         self._internal_moments = subscribe(JointState, f'{node}/internal_moments')
         self._clutches = (subscribe(JointState, f'{node}/clutches')
                           if self._mechanism.actuators else None)
-        self._power_flow = subscribe(Int8, f'{node}/power_flow')
+        self._power_flow = subscribe(JointState, f'{node}/power_flow_stamped')
         self._diagnostics = subscribe(DiagnosticArray, '/diagnostics')
         self.loaded = False      # has any shaft had a torque?
         self.reports = 0         # of /diagnostics
@@ -57,22 +55,21 @@ class Recorder:
 
     def clear(self):
         """Forget what was recorded."""
-        self._joints, self._moments, self._flows = [], {}, []
-        self._forces = {}
+        self._joints, self._moments, self._forces, self._flows = [], {}, {}, {}
         self._missed_before = self._missed
 
     def poll(self):
         """Take all messages that came; return how many ticks they bring."""
         before = len(self._joints)
-        for message, info in poll(self._joint_states):
-            self._joints.append((info['source_timestamp'], message))
+        for message, _ in poll(self._joint_states):
+            self._joints.append(message)
             self.loaded = self.loaded or any(message.effort)
         for message, _ in poll(self._internal_moments):
             self._moments[stamp(message)] = message.effort
         for message, _ in poll(self._clutches) if self._clutches else ():
             self._forces[stamp(message)] = message.effort
-        for message, info in poll(self._power_flow):
-            self._flows.append((info['source_timestamp'], message.data))
+        for message, _ in poll(self._power_flow):
+            self._flows[stamp(message)] = message.position
         for message, _ in poll(self._diagnostics):
             mine = [s for s in message.status if s.hardware_id == self._name]
             self.reports += bool(mine)
@@ -103,18 +100,15 @@ class Recorder:
         return Record(self._mechanism, table[table[:, 0] <= duration], title)
 
     def _rows(self):
-        sent = np.array([timestamp for timestamp, _ in self._flows])
         inputs = [self._mechanism.shafts.index(name) for name in self._mechanism.inputs]
-        ends = [timestamp for timestamp, _ in self._joints[1:]] + [np.inf]
-        for (timestamp, joints), end in zip(self._joints, ends):
+        for joints in self._joints:
             moments = self._moments.get(stamp(joints))
+            flow = self._flows.get(stamp(joints))
             forces = self._forces.get(stamp(joints)) if self._clutches else ()
-            flow = np.searchsorted(sent, timestamp)
-            if None not in (moments, forces) and flow < len(sent) and sent[flow] < end:
+            if None not in (moments, flow, forces):
                 sec, nanosec = stamp(joints)
                 yield (sec + nanosec * 1e-9, *joints.velocity, *joints.position,
-                       *(joints.effort[i] for i in inputs), *moments, self._flows[flow][1],
-                       *forces)
+                       *(joints.effort[i] for i in inputs), *moments, *flow, *forces)
 
 
 def stamp(message):

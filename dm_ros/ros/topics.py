@@ -79,14 +79,14 @@ class Outputs:
         self._node, plant = node, node.plant
         mechanism, settings = plant.simulation.mechanism, plant.settings
         qos = LOCKSTEP_OUTPUT_QOS if plant.lockstep else OUTPUT_QOS
-        self.joint_states = node.publisher(JointState, '~/joint_states', qos)
-        self.internal_moments = node.publisher(JointState, '~/internal_moments', qos)
-        self.clutches = (
-            node.publisher(JointState, '~/clutches', qos) if mechanism.actuators else None)
-        self.power_flow = node.publisher(Int8, '~/power_flow', qos)
+        self._messages = messages = SnapshotMessages(mechanism, settings.joint_prefix)
+        self.of_a_tick = [   # in the order of publication
+            *((node.publisher(JointState, f'~/{topic}', qos), message)
+              for topic, message in messages.joints.items()),
+            (node.publisher(Int8, '~/power_flow', qos), messages.power_flow)]
+        self.joint_states, self._joint_states = self.of_a_tick[0]
         self.clock = node.publisher(Clock, '/clock', qos) if settings.publish_clock else None
         self._simulated_stamps = plant.lockstep or settings.publish_clock
-        self._messages = SnapshotMessages(mechanism, settings.joint_prefix)
 
     def publish(self, snapshot, stamp=None):
         """
@@ -100,12 +100,8 @@ class Outputs:
             stamp = divmod(round(plant.simulation.ticks * 1e9 / plant.settings.rate), 10**9)
         elif stamp is None:
             stamp = self._node.get_clock().now().seconds_nanoseconds()
-        messages = self._messages
-        messages.fill(snapshot, *stamp)
+        self._messages.fill(snapshot, *stamp)
         if self.clock:
-            self.clock.publish(Clock(clock=messages.joint_states.header.stamp))
-        self.joint_states.publish(messages.joint_states)
-        self.internal_moments.publish(messages.internal_moments)
-        if self.clutches:
-            self.clutches.publish(messages.clutches)
-        self.power_flow.publish(messages.power_flow)
+            self.clock.publish(Clock(clock=self._joint_states.header.stamp))
+        for publisher, message in self.of_a_tick:
+            publisher.publish(message)

@@ -3,7 +3,6 @@
 
 """Forces on the clutches over topics: in, out, refused, stale, and closed by a controller."""
 
-from copy import deepcopy
 import math
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -128,26 +127,25 @@ def test_the_outputs_of_a_tick_come_in_their_order_and_clutches_only_where_there
     node, heard = ros.differential(variant, mode='lockstep'), []
 
     class Heard:
-        def __init__(self, name, publisher):
-            self.name, self.publisher = name, publisher
+        def __init__(self, publisher):
+            self.publisher = publisher
 
         def publish(self, message):
-            heard.append((self.name, deepcopy(message)))
+            heard.append(self.publisher.topic_name)
             self.publisher.publish(message)
 
-    kinds = ['joint_states', 'internal_moments', 'clutches', 'power_flow']
+    kinds = ['joint_states', 'internal_moments', 'clutches', 'power_flow_stamped', 'power_flow']
     if not variant_named(variant).mechanism.clutches:
-        assert node.outputs.clutches is None
         kinds.remove('clutches')
     with node.control.lock:
-        for kind in kinds:
-            setattr(node.outputs, kind, Heard(kind, getattr(node.outputs, kind)))
+        node.outputs.of_a_tick[:] = [
+            (Heard(publisher), message) for publisher, message in node.outputs.of_a_tick]
     flow = ros.listen(Int8, '/differential/power_flow')
     publisher = ros.publisher(JointState, TORQUES)
     for _ in range(3):
         publisher.publish(JointState())
     ros.until(lambda: len(flow) == 3)
-    assert [kind for kind, _ in heard] == kinds * 3
+    assert heard == [f'/differential/{kind}' for kind in kinds] * 3
     topics = {name for name, _ in node.get_topic_names_and_types()}
     assert ('/differential/clutches' in topics) == bool(node.simulation.clutches)
 
@@ -378,10 +376,9 @@ def test_what_is_recorded_over_topics_has_the_forces_of_each_tick(ros):
     simulation = Simulation('lsd_ode', 0.01)
     with Recorder('/differential', variant_named('lsd_ode').mechanism) as recorder:
         publisher = ros.publisher(JointState, TORQUES, depth=100)
-        outputs = node.outputs
-        ros.until(lambda: all(output.get_subscription_count() for output in (
-            outputs.joint_states, outputs.internal_moments, outputs.clutches,
-            outputs.power_flow)))
+        stamped = [output for output, message in node.outputs.of_a_tick
+                   if isinstance(message, JointState)]
+        ros.until(lambda: all(output.get_subscription_count() for output in stamped))
         for n in range(50):
             torques, forces = load(n)
             publisher.publish(demand((*torques, *forces)))

@@ -58,17 +58,19 @@ def test_each_message_is_one_tick_with_one_answer_of_each_kind(ros):
     joints = ros.listen(JointState, '/differential/joint_states')
     moments = ros.listen(JointState, '/differential/internal_moments')
     flow = ros.listen(Int8, '/differential/power_flow')
+    stamped = ros.listen(JointState, '/differential/power_flow_stamped')
     publisher = ros.publisher(JointState, '/differential/torques')
     simulation = Simulation('lsd_ode', 1 / 500.0)
     for n in range(1, 101):
         publisher.publish(torques(*load(n)))
-        ros.until(lambda n=n: len(joints) == len(moments) == len(flow) == n)
+        ros.until(lambda n=n: len(joints) == len(moments) == len(flow) == len(stamped) == n)
         snapshot = simulation.step(load(n))
         assert tuple(joints[-1].velocity) == snapshot.velocity
         assert tuple(joints[-1].position) == snapshot.position
         assert tuple(moments[-1].effort) == snapshot.moment
         assert flow[-1].data == snapshot.power_flow
-        assert joints[-1].header.stamp == moments[-1].header.stamp
+        assert stamped[-1].position[0] == snapshot.power_flow
+        assert joints[-1].header == moments[-1].header == stamped[-1].header
         assert joints[-1].header.stamp.nanosec == n * 2_000_000
     assert node.simulation.ticks == 100
 

@@ -6,6 +6,7 @@
 from array import array
 import math
 from pathlib import Path
+from xml.etree import ElementTree
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
@@ -31,6 +32,7 @@ from std_srvs.srv import SetBool, Trigger
 import yaml
 
 from dm_ros import Simulation, VARIANTS
+from dm_ros.files.urdf import urdf
 from dm_ros.mechanism.parameters import SelfLockingParameters, SymmetricParameters
 from dm_ros.settings import NodeParameters
 
@@ -54,7 +56,8 @@ def test_a_tick_publishes_all_shafts_and_moments_by_name_with_one_stamp(ros, var
     joints = ros.listen(JointState, '/differential/joint_states')
     moments = ros.listen(JointState, '/differential/internal_moments')
     flow = ros.listen(Int8, '/differential/power_flow')
-    ros.until(lambda: len(joints) > 5 and len(moments) > 5 and len(flow) > 5)
+    stamped = ros.listen(JointState, '/differential/power_flow_stamped')
+    ros.until(lambda: min(map(len, (joints, moments, flow, stamped))) > 5)
     names = Simulation(variant)
     assert tuple(joints[-1].name) == names.shafts
     assert tuple(moments[-1].name) == names.moments
@@ -62,9 +65,11 @@ def test_a_tick_publishes_all_shafts_and_moments_by_name_with_one_stamp(ros, var
         == len(names.shafts)
     assert len(moments[-1].effort) == len(names.moments)
     assert flow[-1].data == 1
+    assert (list(stamped[-1].name), list(stamped[-1].position)) == (['power_flow'], [1.0])
     stamps = {(m.header.stamp.sec, m.header.stamp.nanosec) for m in joints}
     assert len(stamps) == len(joints)
-    assert stamps & {(m.header.stamp.sec, m.header.stamp.nanosec) for m in moments}
+    for other in (moments, stamped):
+        assert stamps & {(m.header.stamp.sec, m.header.stamp.nanosec) for m in other}
     assert node.get_name() == 'differential'
 
 
@@ -438,12 +443,18 @@ def test_a_joint_prefix_is_before_every_name_that_goes_out(ros, variant, more):
     node = ros.differential(variant, joint_prefix='rear_', **more)
     mechanism = node.simulation.mechanism
     heard = {topic: ros.listen(JointState, f'/differential/{topic}')
-             for topic in ('joint_states', 'internal_moments', 'clutches')}
+             for topic in ('joint_states', 'internal_moments', 'clutches', 'power_flow_stamped')}
     ros.until(lambda: all(heard.values()))
     names = {topic: messages[-1].name for topic, messages in heard.items()}
+    frames = {messages[-1].header.frame_id for messages in heard.values()}
+    robot = ElementTree.fromstring(urdf(mechanism, mechanism.parameters(), 'rear_'))
+    links = {link.get('name') for link in robot.findall('link')}
+    root = links - {joint.find('child').get('link') for joint in robot.findall('joint')}
+    assert frames == root
     assert names == {'joint_states': prefixed(mechanism.shafts),
                      'internal_moments': prefixed(mechanism.moments),
-                     'clutches': prefixed(mechanism.clutch_moments)}
+                     'clutches': prefixed(mechanism.clutch_moments),
+                     'power_flow_stamped': ['rear_power_flow']}
 
 
 @pytest.mark.parametrize('prefix', ['rear_', 'axle2/', 'L.'])

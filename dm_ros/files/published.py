@@ -1,0 +1,58 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the node publishes of a snapshot, as names and arrays, as its JointStates have them."""
+
+from array import array
+from typing import NamedTuple
+
+FRAME = 'housing_link'   # against which shafts turn: the root of the URDF
+EMPTY = array('d')
+
+
+class Arrays(NamedTuple):
+    """The numbers of a JointState, each ``array('d')`` as long as its names, or empty."""
+
+    position: array   # rad
+    velocity: array   # rad/s
+    effort: array     # N m, on clutches N
+
+
+class Published:
+    """
+    The JointStates of a tick.
+
+    ``names`` maps the last word of each topic, in the order of publication, to its list of names;
+    ``frame`` is their ``frame_id``.
+    """
+
+    def __init__(self, mechanism, prefix=''):
+        """:param mechanism: its ``Mechanism``; prefix: before each name and the frame."""
+        self.frame = prefix + FRAME
+        self.names = {'joint_states': mechanism.shafts, 'internal_moments': mechanism.moments}
+        if mechanism.actuators:
+            self.names['clutches'] = [clutch.name for clutch in mechanism.actuators]
+        self.names['power_flow_stamped'] = ['power_flow']
+        self.names = {topic: [prefix + name for name in names]
+                      for topic, names in self.names.items()}
+        self._no_torque = dict.fromkeys(mechanism.shafts, 0.0)
+        self._inputs = mechanism.inputs
+        self._carrier = mechanism.shafts.index('carrier')
+        self._clutched = tuple(map(mechanism.shafts.index, mechanism.clutches))
+
+    def arrays(self, snapshot):
+        """Return the ``Arrays`` of a ``Snapshot`` for each topic, in the order of ``names``."""
+        torque = {**self._no_torque, **dict(zip(self._inputs, snapshot.torque))}
+        result = [Arrays(array('d', snapshot.position), array('d', snapshot.velocity),
+                         array('d', torque.values())),
+                  Arrays(EMPTY, EMPTY, array('d', snapshot.moment))]
+        if self._clutched:
+            result.append(Arrays(self._slip(snapshot.position), self._slip(snapshot.velocity),
+                                 array('d', snapshot.clutch_force)))
+        result.append(Arrays(array('d', (snapshot.power_flow,)), EMPTY, EMPTY))
+        return result
+
+    def _slip(self, values):
+        """Return how far the shafts with a clutch are ahead of the carrier."""
+        carrier = values[self._carrier]
+        return array('d', [values[i] - carrier for i in self._clutched])
