@@ -144,13 +144,13 @@ class Handler(BaseHTTPRequestHandler):
         """Take a command."""
         body = self.body()
         try:
-            answer = self.command(body)
+            answer = self.obey(body)
         except Refused as refused:
             self.tell(refused.status, refused)
         else:
             self.answer(200, 'application/json', json.dumps(answer).encode())
 
-    def command(self, body):
+    def obey(self, body):
         """Return what to answer to a command; raise ``Refused``."""
         server = self.server
         if refusal := server.guard.refusal(self.headers):

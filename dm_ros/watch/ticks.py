@@ -34,7 +34,8 @@ class Joined:
         """:param topics: number of topics."""
         self._topics = topics
         self._waiting = {}   # {stamp: [part or None]} in the order in which they came
-        self.lost = 0        # ticks without all parts
+        self.lost = 0        # ticks without all parts, but for those at the begin
+        self._begun = False
 
     def put(self, topic, stamp, values):
         """Take a message; topic: by number; stamp: ns; values: tuple of numbers."""
@@ -47,7 +48,9 @@ class Joined:
             return []
         taken = [Tick(stamp, tuple(self._waiting.pop(stamp)))
                  for stamp in list(self._waiting)[:whole[-1] + 1]]
-        self.lost += len(taken) - len(whole)
+        if self._begun:
+            self.lost += len(taken) - len(whole)
+        self._begun = True
         return [tick for tick in taken if None not in tick.parts]
 
 
