@@ -5,7 +5,8 @@
 
 from concurrent.futures import Future
 import math
-from queue import Empty, Queue
+from queue import Queue
+import time
 
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -41,7 +42,7 @@ class Commander:
         self._publisher = node.create_publisher(JointState, f'{name}/torques', QOS)
         self._clients = {word: node.create_client(kind, f'{name}/{service}')
                          for word, (kind, service, _) in SERVICES.items()}
-        self._requests = Queue()   # (word, count, Future)
+        self._requests = Queue()   # (word, count, Future, deadline)
         self._sent = {}   # the last commands that went out
 
     def command(self, viewer, request):
@@ -63,7 +64,7 @@ class Commander:
             raise Refused(400, f'count: {count!r} is not allowed, it must be an integer in '
                                f'[1, {MOST_TICKS}]')
         future = Future()
-        self._requests.put((word, count, future))
+        self._requests.put((word, count, future, time.monotonic() + PATIENCE))
         try:
             success, message = future.result(timeout=2 * PATIENCE)
         except TimeoutError as error:
@@ -80,11 +81,8 @@ class Commander:
 
     def poll(self):
         """Send what is to be sent now."""
-        try:
-            while True:
-                self._serve(*self._requests.get_nowait())
-        except Empty:
-            pass
+        for _ in range(self._requests.qsize()):
+            self._serve(*self._requests.get_nowait())
         scene = self._live.scene
         if not scene:
             self._sent = {}
@@ -122,15 +120,18 @@ class Commander:
                                 for is_speed, number in zip(speeds, numbers)]
         self._publisher.publish(message)
 
-    def _serve(self, word, count, future):
+    def _serve(self, word, count, future, deadline):
         """Begin what a request asks for; the future has its end, (success, message)."""
         scene = self._live.scene
         if not scene:
             future.set_result((False, 'there is no node'))
         elif word == 'ticks':
             self._tick(scene, count, future)
-        elif not self._clients[word].service_is_ready():
-            future.set_result((False, 'the node does not serve it'))
+        elif not self._clients[word].service_is_ready():   # it may come later than topics
+            if time.monotonic() > deadline:
+                future.set_result((False, 'the node does not serve it'))
+            else:
+                self._requests.put((word, count, future, deadline))
         else:
             kind, _, fields = SERVICES[word]
             self._asked.call(

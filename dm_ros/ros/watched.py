@@ -76,7 +76,8 @@ class Watched:
         :param node: that listens; name: full name of the one that is watched.
         :param live: ``Live``, which is told; asked: ``Asked`` of the node that listens.
         """
-        self._name, self._live, self._asked = name, live, asked
+        self._node, self._name, self._live, self._asked = node, name, live, asked
+        self._topic = node.resolve_topic_name(f'{name}/joint_states')
         polled = Polled()
 
         def subscribe(message_type, topic):
@@ -88,8 +89,7 @@ class Watched:
         self._list = node.create_client(ListParameters, f'{name}/list_parameters')
         self._get = node.create_client(GetParameters, f'{name}/get_parameters')
         self._learning, self._last_look = False, -math.inf
-        self._number = -1   # of the last joint states of their publisher
-        self.refusal = None   # why the node cannot be shown, in words
+        self._publishers = set()   # of joint states, as DDS knows them
 
     def poll(self):
         """Take all that has come."""
@@ -99,9 +99,7 @@ class Watched:
             self._last_look = now
             self._look()
         for topic, subscription in self._topics.items():
-            for message, info in poll(subscription):
-                if topic == 'joint_states':
-                    self._note(info['publication_sequence_number'])
+            for message, _ in poll(subscription):
                 self._take(topic, message)
         for message, _ in poll(self._diagnostics):
             mine = [status for status in message.status if status.hardware_id == self._name]
@@ -114,26 +112,21 @@ class Watched:
 
     def _look(self):
         """See whether the node has come or gone."""
-        is_there = (self._topics['joint_states'].get_publisher_count() > 0
-                    and self._list.service_is_ready() and self._get.service_is_ready())
-        if not is_there and (self._live.scene or self._learning):
+        found = {bytes(info.endpoint_gid)
+                 for info in self._node.get_publishers_info_by_topic(self._topic)}
+        # one that was killed is still found for long, beside the one that takes its place
+        if not found or found - self._publishers:
             self._went()
-        elif is_there and not self._live.scene and not self._learning:
+        self._publishers = found
+        if (found and not self._live.scene and not self._learning
+                and self._list.service_is_ready() and self._get.service_is_ready()):
             self._learn(self._live.came)
 
     def _went(self):
         self._asked.forget()
-        self._learning, self._number = False, -1
+        self._learning = False
         if self._live.scene:
             self._live.went()
-
-    def _note(self, number):
-        """Notice a node that has been started anew: its messages are counted from one again."""
-        if number is None:
-            return
-        if number < self._number and self._live.scene:
-            self._went()
-        self._number = number
 
     def _take(self, topic, message):
         scene = self._live.scene
@@ -168,7 +161,7 @@ class Watched:
         try:
             learned(values)
         except ValueError as error:   # as of another version
-            self.refusal = str(error)
+            self._live.went(str(error))
 
 
 def as_words(name, status):

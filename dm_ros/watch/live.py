@@ -30,7 +30,7 @@ class Live:
         self._name, self._viewers, self._commands = name, viewers, commands
         self.scene = None
         self._now, self._reports, self._told = None, [], {}
-        self._waiting = as_json({'node': name})
+        self._waiting = {'node': name, 'refusal': None}
         self._fresh()
         viewers.greeting = self._greeting
 
@@ -62,8 +62,9 @@ class Live:
         else:   # clutches have come or gone
             self.came(values)
 
-    def went(self):
-        """Forget the node: it has ended."""
+    def went(self, refusal=None):
+        """Forget the node: it has ended; refusal: why it cannot be shown, if that is so."""
+        self._waiting = {'node': self._name, 'refusal': refusal}
         self._fresh()
         self._now, self._reports = None, []
         self._commands.begin([])
@@ -126,7 +127,7 @@ class Live:
         self._viewers.publish(self._scene_event(scene), change=change)
 
     def _scene_event(self, scene):
-        return event('scene', as_json(scene.description) if scene else self._waiting)
+        return event('scene', as_json(scene.description if scene else self._waiting))
 
     def _greeting(self):
         """Return the events that tell all."""

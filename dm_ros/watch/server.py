@@ -17,6 +17,7 @@ from dm_ros.watch.commands import read, Refused
 from dm_ros.watch.guard import Guard, is_token, TOKEN
 
 WEB = Path(__file__).with_name('web')
+PAGE = WEB / 'page.html'
 TYPES = {'.html': 'text/html; charset=utf-8', '.js': 'text/javascript; charset=utf-8',
          '.css': 'text/css; charset=utf-8', '.svg': 'image/svg+xml'}
 HEADERS = {
@@ -44,13 +45,13 @@ load this page again.</p></html>"""
 def files():
     """Return ``{path: (type, bytes)}`` of all that is served, but for the page itself."""
     return {f'/{path.relative_to(WEB).as_posix()}': (TYPES[path.suffix], path.read_bytes())
-            for path in sorted(WEB.rglob('*')) if path.suffix in TYPES}
+            for path in sorted(WEB.rglob('*')) if path.suffix in TYPES and path != PAGE}
 
 
 def page(token):
     """Return the page; token: what allows to command, None where nobody may."""
     tag = f'<meta name="token" content="{escape(token)}">' if token else ''
-    return (WEB / 'page.html').read_text().replace('<!-- token -->', tag).encode()
+    return PAGE.read_text().replace('<!-- token -->', tag).encode()
 
 
 class Server(ThreadingHTTPServer):

@@ -48,9 +48,9 @@ class Joined:
             return []
         taken = [Tick(stamp, tuple(self._waiting.pop(stamp)))
                  for stamp in list(self._waiting)[:whole[-1] + 1]]
-        if self._begun:
-            self.lost += len(taken) - len(whole)
+        begin = 0 if self._begun else whole[0]
         self._begun = True
+        self.lost += len(taken) - begin - len(whole)
         return [tick for tick in taken if None not in tick.parts]
 
 

@@ -25,7 +25,7 @@ export class Colours {
     // a shaft of the page has its colour in lines, and a calmer one in the drawing
     this.lines = this.names.map(name => style.getPropertyValue(`--${name}`).trim());
     this.plain = read('--metal');
-    this.shafts = this.names.map(name => blend(this.plain, read(`--${name}`), 0.42));
+    this.shafts = this.names.map(name => blend(this.plain, read(`--${name}`), 0.3));
     [this.dark, this.mark, this.paper, this.ink] = ['--shadow', '--mark', '--panel', '--ink'].map(read);
     this.grid = style.getPropertyValue('--grid').trim();
     this.text = style.getPropertyValue('--soft').trim();

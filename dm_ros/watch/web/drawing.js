@@ -6,7 +6,7 @@
 import {blend, Colours, role} from './colours.js';
 import {Mechanism} from './mechanism.js';
 
-const YAW = 0.62, PITCH = 0.44;           // rad, of the eye
+const YAW = 0.72, PITCH = 0.44;           // rad, of the eye
 const LIGHT = [-0.35, 0.75, 0.56];        // towards it, as the eye sees
 const SHADES = 24;
 const GLOW = 0.55;                        // how far from where teeth touch a mesh has its colour

@@ -38,6 +38,8 @@ function show(description) {
     ? `${scene.variant}, ${scene.rate} Hz, ${scene.mode}, ${scene.law} law of losses` : '';
   $('waiting').hidden = Boolean(scene);
   document.querySelector('.node').textContent = description.node;
+  $('refusal').hidden = !description.refusal;
+  $('refusal').textContent = `It is there, but cannot be shown: ${description.refusal}`;
   $('how').textContent = how(description.node);
   $('loss').textContent = '';
   most = {power: new Most(), heat: new Most()};

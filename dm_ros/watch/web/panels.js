@@ -10,7 +10,7 @@ import {make, number, power, words} from './words.js';
 const PLACES = {first: 'bottom left', second: 'bottom right', satellite: 'top centre'};
 const DRIVEN = {carrier: 'top right', pinion: 'top left'}, BARE = {carrier: 'top left'};
 const NICE = [1, 2, 5, 10];
-const MEMORY = 30;   // s for which the most of a power is remembered
+const MEMORY = 10;   // s for which the most of a power is remembered
 
 // The least of 1, 2, 5, 10, 20, ... that is not below a value.
 function nice(value) {

@@ -43,6 +43,7 @@ export class Solid {
 // `core`: (a, r) to which it goes behind the inner one.
 export function gear(teeth, {outer, inner, tip, rim, hub, core}) {
   const solid = new Solid();
+  solid.teeth = teeth;
   const step = 2 * Math.PI / teeth, module = 2 * outer[1] / teeth;
   const shrunk = Math.min(1, inner[1] / outer[1]);
   const at = ([a, r], height) => [a + height * tip[0], r + height * tip[1]];
