@@ -90,7 +90,7 @@ def test_no_script_of_the_page_does_either():
 
 def test_all_files_of_the_page_are_installed():
     setup = (ROOT.parent / 'setup.py').read_text()
-    patterns = re.search(r"package_data=\{NAME: \[(.*)\]\}", setup).group(1)
+    patterns = re.search(r'package_data=\{NAME: \[(.*)\]\}', setup).group(1)
     installed = {path for pattern in re.findall(r"'(.+?)'", patterns)
                  for path in ROOT.glob(pattern)}
     web = {path for path in (ROOT / 'watch' / 'web').rglob('*') if path.is_file()}

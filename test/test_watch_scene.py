@@ -5,7 +5,8 @@
 
 from math import pi
 
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 from mechanisms import random_self_locking, random_symmetric
 import numpy as np
 import pytest
@@ -37,14 +38,13 @@ def test_a_tick_has_a_number_for_each_line_of_the_strips(variant):
     published = Published(simulation.mechanism)
     snapshot = simulation.step((30.0, -10.0, -5.0))
     arrays = published.arrays(snapshot)
-    assert it.topics == tuple(published.names)
-    assert it.lengths() == [len(names) for names in published.names.values()]
-    parts = [array for (position, velocity, effort) in arrays[1:]
-             for array in (effort or position,)]
+    assert it.names == published.names
+    moment, *force, flow = [effort or position for position, _, effort in arrays[1:]]
     columns = dict(zip(
         [(strip['name'], series) for strip in it.description['strips']
          for series in strip['series']],
-        it.columns(arrays[0].velocity, arrays[0].effort, *parts), strict=True))
+        it.columns(arrays[0].velocity, arrays[0].effort, moment, *(force or [()]), flow),
+        strict=True))
     for shaft, speed in zip(simulation.shafts, snapshot.velocity):
         assert columns['speeds', shaft] == speed
     for shaft in simulation.mechanism.outputs:
@@ -129,7 +129,7 @@ def test_what_can_be_commanded_has_its_kind_and_range():
 
 
 def test_clutches_come_with_their_friction_surfaces():
-    assert 'clutches' not in scene().topics
+    assert 'clutches' not in scene().names
     it = scene(symmetric__clutch__left__friction_surfaces=4)
-    assert 'clutches' in it.topics
+    assert 'clutches' in it.names
     assert it.description['clutches'] == {'left_clutch': 'left', 'right_clutch': 'right'}

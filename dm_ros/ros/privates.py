@@ -32,16 +32,20 @@ def given_parameters(node):
     return {name: p.value for name, p in node._parameter_overrides.items()}
 
 
-def take(subscription):
-    """Return ``(message, info)`` of the oldest message a polled subscription holds, or None."""
+def take(subscription, raw=False):
+    """
+    Return ``(message, info)`` of the oldest message a polled subscription holds, or None.
+
+    :param raw: whether the message is to be its bytes, as they were sent.
+    """
     handle = subscription.handle
     with handle:
-        return handle.take_message(subscription.msg_type, False)
+        return handle.take_message(subscription.msg_type, raw)
 
 
-def poll(subscription):
-    """Yield ``(message, info)`` for all that a polled subscription holds now."""
-    while taken := take(subscription):
+def poll(subscription, raw=False):
+    """Yield ``(message, info)`` for all that a polled subscription holds now; raw: as ``take``."""
+    while taken := take(subscription, raw):
         yield taken
 
 

@@ -3,6 +3,7 @@
 
 """The node that is watched: it comes and goes, is heard, and commanded if one may."""
 
+from contextlib import suppress
 import math
 import time
 
@@ -16,6 +17,7 @@ from sensor_msgs.msg import JointState
 
 from dm_ros.ros.messages import never_called, Polled
 from dm_ros.ros.privates import poll
+from dm_ros.ros.serialized import Layout
 from dm_ros.settings import known_rows
 
 # best effort hears every publisher and makes none wait; deep enough for some seconds at 1 kHz
@@ -23,7 +25,7 @@ HEARD = QoSProfile(depth=5000, reliability=ReliabilityPolicy.BEST_EFFORT)
 PATIENCE = 3.0    # s for the node to answer
 LOOK = 0.3        # s from one look at who is there to the next
 TOPICS = {'joint_states': ('position', 'velocity', 'effort'), 'internal_moments': ('effort',),
-          'clutches': ('effort',), 'power_flow_stamped': ('position',)}
+          'clutches': ('position', 'velocity', 'effort'), 'power_flow_stamped': ('position',)}
 LEVELS = {b'\0': 'ok', b'\1': 'warn', b'\2': 'error', b'\3': 'stale'}
 
 
@@ -88,6 +90,7 @@ class Watched:
         self._events = subscribe(ParameterEvent, '/parameter_events')
         self._list = node.create_client(ListParameters, f'{name}/list_parameters')
         self._get = node.create_client(GetParameters, f'{name}/get_parameters')
+        self._scene, self._layouts = None, {}   # for whose messages, {topic: (number, Layout)}
         self._learning, self._last_look = False, -math.inf
         self._publishers = set()   # of joint states, as DDS knows them
 
@@ -99,8 +102,8 @@ class Watched:
             self._last_look = now
             self._look()
         for topic, subscription in self._topics.items():
-            for message, _ in poll(subscription):
-                self._take(topic, message)
+            for data, _ in poll(subscription, raw=True):
+                self._take(topic, data)
         for message, _ in poll(self._diagnostics):
             mine = [status for status in message.status if status.hardware_id == self._name]
             if mine and self._live.scene:
@@ -125,19 +128,19 @@ class Watched:
     def _went(self):
         self._asked.forget()
         self._learning = False
-        if self._live.scene:
-            self._live.went()
+        self._live.went()
 
-    def _take(self, topic, message):
-        scene = self._live.scene
-        if not scene or topic not in scene.topics:
-            return
-        arrays = [tuple(getattr(message, name)) for name in TOPICS[topic]]
-        index = scene.topics.index(topic)
-        if any(len(array) != scene.lengths()[index] for array in arrays):
-            return   # of a node before or after this one
-        stamp = message.header.stamp
-        self._live.put(index, stamp.sec * 10**9 + stamp.nanosec, *arrays)
+    def _take(self, topic, data):
+        """Take the bytes of a message of a topic."""
+        if self._live.scene is not self._scene:
+            self._scene = scene = self._live.scene
+            self._layouts = {topic: (index, Layout(scene.frame, names, TOPICS[topic]))
+                             for index, (topic, names) in enumerate(scene.names.items())
+                             } if scene else {}
+        if topic in self._layouts:
+            index, layout = self._layouts[topic]
+            with suppress(ValueError):   # of a node before or after this one
+                self._live.put(index, *layout.read(data))
 
     def _learn(self, learned):
         """Ask for all parameters, and let ``learned`` take them."""

@@ -47,7 +47,7 @@ class Live:
         scene = Scene(self._name, values)
         self._fresh()
         self._strips = Strips(1 / scene.node.rate)
-        self._joined = Joined(len(scene.topics))
+        self._joined = Joined(len(scene.names))
         self._commands.begin(scene.ports)
         self._now, self._reports = None, []
         self._show(scene)
@@ -55,7 +55,7 @@ class Live:
     def changed(self, values):
         """Take the parameters of the node after some have been changed, as ``came`` does."""
         scene = Scene(self._name, values)
-        if self.scene and scene.topics == self.scene.topics:
+        if self.scene and scene.names == self.scene.names:
             if scene.ports != self.scene.ports:
                 self._commands.begin(scene.ports)
             self._show(scene)
@@ -64,17 +64,19 @@ class Live:
 
     def went(self, refusal=None):
         """Forget the node: it has ended; refusal: why it cannot be shown, if that is so."""
+        if not self.scene and self._waiting['refusal'] == refusal:
+            return
         self._waiting = {'node': self._name, 'refusal': refusal}
         self._fresh()
         self._now, self._reports = None, []
         self._commands.begin([])
         self._show(None)
 
-    def put(self, topic, stamp, *arrays):
+    def put(self, topic, stamp, arrays):
         """
         Take a message of the node.
 
-        :param topic: which of ``scene.topics``, by number; stamp: ns; arrays: of numbers.
+        :param topic: which of ``scene.names``, by number; stamp: ns; arrays: of numbers.
         """
         self._joined.put(topic, stamp, arrays)
 
@@ -98,17 +100,17 @@ class Live:
         if not ticks:
             return
         for tick in ticks:
-            (position, velocity, torque), *parts = tick.parts
-            parts = [array for part in parts for array in part]
+            (position, velocity, torque), (moment,), *clutches, (flow,) = tick.parts
+            force = clutches[0][2] if clutches else ()
             is_reset = self._travel.add(position)
-            self._strips.add(tick.stamp, self.scene.columns(velocity, torque, *parts), is_reset)
+            self._strips.add(tick.stamp, self.scene.columns(
+                velocity, torque, moment, force, flow), is_reset)
         if len(ticks) == 1:   # it may be the last one for long
             self._strips.close()
-        moment, *force, flow = parts
         now = {
             'stamp': tick.stamp * 1e-9, 'ticks': len(ticks), 'lost': self._joined.lost,
             'position': list(position), 'velocity': list(velocity), 'torque': list(torque),
-            'moment': list(moment), 'force': list(force[0]) if force else [],
+            'moment': list(moment), 'force': list(force),
             'flow': flow[0], 'travel': self._travel.total}
         emptied, rows = self._strips.take()
 

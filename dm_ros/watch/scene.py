@@ -6,6 +6,7 @@
 from itertools import product
 from math import asin, copysign, log, pi
 
+from dm_ros.files.published import Published
 from dm_ros.files.urdf import sizes
 from dm_ros.mechanism.variants import equipped, variant_named
 from dm_ros.settings import NodeParameters, port_parameters, speed_ports
@@ -100,8 +101,12 @@ def control_ports(mechanism, node, limits):
 
 class Scene:
     """
-    A node as it runs: which columns it has, and ``description``, which goes to the page.
+    A node as it runs.
 
+    :ivar description: what the page is told, as JSON has it.
+    :ivar names: ``{last word of a topic: names in its messages}`` of those that make a tick.
+    :ivar frame: the ``frame_id`` of these messages.
+    :ivar ports: what can be commanded, as ``control_ports`` returns it.
     :raises ValueError: for parameters that this version does not know or cannot have.
     """
 
@@ -137,24 +142,13 @@ class Scene:
             'strips': [{'name': name, 'unit': unit, 'series': series}
                        for name, unit, series in strips],
             'ports': self.ports, 'gears': drawing, 'not drawn': refusal}
+        published = Published(mechanism, node.joint_prefix)
+        self.names, self.frame = published.names, published.frame
         self._inputs = [mechanism.shafts.index(shaft) for shaft in mechanism.inputs]
         self._outputs = [mechanism.shafts.index(shaft) for shaft in mechanism.outputs]
 
-    @property
-    def topics(self):
-        """Last words of the topics with a stamp whose messages make a tick."""
-        return ('joint_states', 'internal_moments',
-                *(['clutches'] if self.mechanism.actuators else []), 'power_flow_stamped')
-
-    def lengths(self):
-        """Return how many names each of the ``topics`` has."""
-        mechanism = self.mechanism
-        return [len(mechanism.shafts), len(mechanism.moments),
-                *([len(mechanism.actuators)] if mechanism.actuators else []), 1]
-
-    def columns(self, velocity, torque, moment, *forces_and_flow):
+    def columns(self, velocity, torque, moment, force, flow):
         """Return the numbers of a tick in the order of the strips; each argument is an array."""
         carrier = velocity[0]
         return (*velocity, *(velocity[i] - carrier for i in self._outputs), *moment,
-                *(torque[i] for i in self._inputs),
-                *(number for part in forces_and_flow for number in part))
+                *(torque[i] for i in self._inputs), *force, *flow)

@@ -79,9 +79,9 @@ class Strips:
     """
     The last ``SPAN`` s of some columns, as rows that are drawn, each as JSON.
 
-    ``take`` returns what is new. A row is ``[time, number, ...]`` with the time in s since the first
-    one, or ``null`` where no line goes across: after a pause, or at a reset. A time that goes back
-    empties all.
+    ``take`` returns what is new. A row is ``[time, number, ...]`` with the time in s since the
+    first one, or ``null`` where no line goes across: after a pause, or at a reset. A time that
+    goes back empties all.
     """
 
     def __init__(self, period=0.0):

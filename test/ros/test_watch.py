@@ -21,6 +21,7 @@ from sensor_msgs.msg import JointState
 from dm_ros.mechanism.variants import MECHANISMS
 from dm_ros.ros.messages import LOCKSTEP_OUTPUT_QOS
 
+
 class Page:
     """What a browser hears of ``watch``: the last event of each name."""
 

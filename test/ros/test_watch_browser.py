@@ -14,6 +14,9 @@ from processes import command, Forked
 import pytest
 from sensor_msgs.msg import JointState
 
+from dm_ros.mechanism.variants import MECHANISMS
+from dm_ros.watch.scene import Scene
+
 webdriver = pytest.importorskip('selenium.webdriver')
 BROWSER, DRIVER = (next(filter(None, map(shutil.which, names)), None) for names in (
     ('chromium', 'chromium-browser', 'google-chrome'), ('chromedriver',)))
@@ -114,7 +117,8 @@ class Screen:
     def move(self, name, value):
         """Move a slider, as a hand does."""
         self.driver.execute_script("""
-            const slider = document.querySelector(`#control input[type=range][name=${arguments[0]}]`);
+            const slider = document.querySelector(
+                `#control input[type=range][name=${arguments[0]}]`);
             slider.value = arguments[1];
             slider.dispatchEvent(new Event('input', {bubbles: true}));""", name, value)
 
@@ -152,7 +156,7 @@ def screen(ros, chromium):
 
 
 @pytest.mark.parametrize('variant, shaft', [('symmetric_ode', 'left'), ('lsd_ode', 'rear')])
-def test_the_picture_turns_while_the_shafts_do_and_stands_while_paused(ros, screen, variant, shaft):
+def test_the_picture_turns_as_the_shafts_do_and_stands_while_paused(ros, screen, variant, shaft):
     node = ros.differential(variant, **{f'initial_velocity__{shaft}': 30.0})
     it = screen()
     ros.until(lambda: it.text('#state') == 'running')
@@ -176,9 +180,8 @@ def test_a_shaft_that_stands_is_drawn_so(ros, screen):
 
 @pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])
 def test_the_labels_have_speeds_and_torques_of_the_topics(ros, screen, variant):
-    node = ros.differential(variant, mode='lockstep', initial_velocity__left=12.0) if (
-        variant == 'symmetric_ode') else ros.differential(
-        variant, mode='lockstep', initial_velocity__rear=12.0)
+    shaft = MECHANISMS[variant.split('_')[0]].outputs[1]
+    node = ros.differential(variant, mode='lockstep', **{f'initial_velocity__{shaft}': 12.0})
     joints = ros.listen(JointState, '/differential/joint_states')
     it = screen()
     ros.until(lambda: it.text('#state') == 'waits for messages on ~/torques')
@@ -289,7 +292,6 @@ def test_all_is_within_the_width_of_the_screen(ros, screen, chromium, width):
 
 
 def test_the_teeth_mesh_wherever_the_shafts_are(ros, screen):
-    from dm_ros.watch.scene import Scene
     values = [{'variant': 'symmetric_ode'}, {'variant': 'lsd_ode'}]
     values += [{'variant': 'symmetric_ode', 'symmetric.final_drive_ratio': ratio,
                 'symmetric.satellite_count': count}
