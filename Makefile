@@ -13,7 +13,7 @@ PYTEST_ARGS =
 PARALLEL = -n auto --dist worksteal
 BENCH_ARGS =
 COMPARE_ARGS =
-EXTRAS = ros,test
+EXTRAS = ros,bag,test
 
 # The interpreter beneath any virtual environment, and where rclpy comes from:
 # `ros`, a sourced ROS 2 in which it imports, or `pypi`, the wheels.

@@ -30,7 +30,9 @@ setup(
     python_requires='>=3.11',
     install_requires=['numpy>=1.26', 'scipy>=1.11', 'PyYAML', 'tqdm'],
     extras_require={
+        'bag': ['rosbags>=0.11.9'],
         'browser': ['selenium>=4.11'],
+        'mcap': ['mcap-ros2-support'],
         'physics': ['mujoco>=4'],
         'plot': [MATPLOTLIB],
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],

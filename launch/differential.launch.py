@@ -24,8 +24,6 @@ ARGUMENTS = {
     'record': 'a new folder, to record the topics of the node in it by ros2 bag',
 } | {name: f'{ROWS[name].description}: {ROWS[name].allowed}; '
            'not given: as the file, else the node has it' for name in PARAMETERS}
-RECORDED = ('differential/joint_states', 'differential/internal_moments', 'differential/clutches',
-            'differential/power_flow_stamped', 'differential/torques', '/diagnostics')
 
 
 def generate_launch_description():
@@ -54,9 +52,9 @@ def processes(context):
             parameters=[{'publish_frequency': 50.0, 'robot_description': ParameterValue(
                 Command(urdf_command(given)), value_type=str)}], **shown))
     if 'record' in given:
-        topics = [prefix_namespace(namespace, topic) for topic in RECORDED]
+        topics = f'{prefix_namespace(namespace, "differential")}/.*|/diagnostics'
         result.append(ExecuteProcess(cmd=[
-            'ros2', 'bag', 'record', '--output', given['record'], '--topics', *topics], **shown))
+            'ros2', 'bag', 'record', '--output', given['record'], '--regex', topics], **shown))
     return result
 
 

@@ -5,7 +5,6 @@
 
 import ast
 from pathlib import Path
-import re
 
 from dm_ros.settings import NodeParameters
 
@@ -25,13 +24,6 @@ def constant(file, name):
 def test_arguments_by_the_name_of_a_parameter_are_parameters_of_the_node():
     names = {name for name, _ in NodeParameters().rows().values()}
     assert set(constant('differential.launch.py', 'PARAMETERS')) <= names
-
-
-def test_all_topics_are_recorded_that_the_page_of_lockstep_records():
-    page = re.sub(r'\\\n\s*', '', (ROOT / 'doc' / 'lockstep.md').read_text())
-    command = re.search(r'^ {4}ros2 bag record --topics (.*)', page, re.MULTILINE).group(1).split()
-    assert set(command) == {'/' + topic.removeprefix('/')
-                            for topic in constant('differential.launch.py', 'RECORDED')}
 
 
 def test_the_page_tells_of_each_file_and_each_argument():

@@ -11,6 +11,9 @@ import matplotlib.figure  # noqa: F401
 import pytest
 
 from dm_ros import Simulation
+from dm_ros.files.bag import has_rosbags
+from dm_ros.files.recorded_drive import read_drive
+from dm_ros.mechanism.variants import variant_named
 from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.testing import DirectDifferential
 
@@ -102,12 +105,16 @@ def test_a_failing_test_leaves_its_record_and_a_passing_one_does_not(pytester):
         '-p', 'no:hypothesispytest', '--differential-records', 'left')
     result.assert_outcomes(passed=1, failed=1)
     left = sorted((pytester.path / 'left').iterdir())
+    *left, bag = left if has_rosbags() else (*left, None)
     assert [path.suffix for path in left] == ['.csv', '.png']
     with open(left[0], newline='') as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 50
     assert float(rows[-1]['torque.rear']) == -150.0
     assert left[1].read_bytes().startswith(b'\x89PNG')
+    if bag:
+        drive = read_drive(bag, variant_named('lsd_ode').mechanism, 1.0)
+        assert list(drive.table.held(1e-3)) == [(*TORQUES, 0.0, 0.0)] * 50
 
 
 def test_the_plugin_loads_neither_ros_nor_matplotlib_where_no_test_wants_it(pytester):

@@ -1,9 +1,10 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the node publishes of a snapshot, as names and arrays, as its JointStates have them."""
+"""The topics of a node without ROS: names and arrays of its JointStates, in and out."""
 
 from array import array
+import math
 from typing import NamedTuple
 
 FRAME = 'housing_link'   # against which shafts turn: the root of the URDF
@@ -56,3 +57,29 @@ class Published:
         """Return how far the shafts with a clutch are ahead of the carrier."""
         carrier = values[self._carrier]
         return array('d', [values[i] - carrier for i in self._clutched])
+
+
+class Commands:
+    """A message on ``~/torques``: ``names``, and the arrays for a value of each port."""
+
+    def __init__(self, ports, prefix=''):
+        """:param ports: the ``Port`` s whose values it brings; prefix: before each name."""
+        self.names = [prefix + port.name for port in ports]
+        self._is_speed = [port.kind == 'speed' for port in ports]
+
+    def arrays(self, values):
+        """Return the ``Arrays`` of one value for each port, in its unit; None for no speed."""
+        numbers = [math.nan if value is None else float(value) for value in values]
+        efforts, velocities = (
+            array('d', [number if is_speed is wanted else math.nan
+                        for number, is_speed in zip(numbers, self._is_speed, strict=True)])
+            for wanted in (False, True))
+        return Arrays(EMPTY, velocities if any(self._is_speed) else EMPTY, efforts)
+
+
+def input_topics(mechanism):
+    """Return ``{topic: port name}`` of the topics of single ports of a ``Mechanism``, below ~."""
+    topics = {f'{port.kind}/{port.name}': port.name for port in mechanism.ports}
+    topics.update((f'clutch/{clutch}', actuator.name)
+                  for clutch, actuator in zip(mechanism.clutches, mechanism.actuators))
+    return topics

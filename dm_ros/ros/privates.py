@@ -36,7 +36,7 @@ def take(subscription, raw=False):
     """
     Return ``(message, info)`` of the oldest message a polled subscription holds, or None.
 
-    :param raw: whether the message is to be its bytes, as they were sent.
+    :param raw: whether the message is bytes, as it came.
     """
     handle = subscription.handle
     with handle:
@@ -44,7 +44,7 @@ def take(subscription, raw=False):
 
 
 def poll(subscription, raw=False):
-    """Yield ``(message, info)`` for all that a polled subscription holds now; raw: as ``take``."""
+    """Yield ``(message, info)`` for all that a polled subscription holds now."""
     while taken := take(subscription, raw):
         yield taken
 

@@ -7,6 +7,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int8
 
+from dm_ros.files.published import input_topics
 from dm_ros.motion.held_inputs import Joints
 from dm_ros.ros.messages import (
     LATEST_QOS,
@@ -35,12 +36,9 @@ class Inputs:
             return node.create_subscription(message_type, topic, never_called, qos,
                                             callback_group=polled)
         mechanism = plant.simulation.mechanism
-        topics = {f'~/{port.kind}/{port.name}': port.name for port in mechanism.ports}
-        topics.update((f'~/clutch/{clutch}', actuator.name)
-                      for clutch, actuator in zip(mechanism.clutches, mechanism.actuators))
         self._single = [] if plant.lockstep else [
-            (topic, port, subscription(Float64, topic, LATEST_QOS))
-            for topic, port in topics.items()]
+            (f'~/{topic}', port, subscription(Float64, f'~/{topic}', LATEST_QOS))
+            for topic, port in input_topics(mechanism).items()]
         self.torques = subscription(JointState, '~/torques',
                                     LOCKSTEP_INPUT_QOS if plant.lockstep else SHARED_QOS)
         if plant.lockstep:   # in real time publishers of all kinds are heard

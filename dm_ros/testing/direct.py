@@ -3,6 +3,7 @@
 
 """A differential and a control law in one process, without topics."""
 
+from dm_ros.files.bag import TickBag
 from dm_ros.files.record import Record
 from dm_ros.motion.simulation import Simulation
 
@@ -18,6 +19,7 @@ class DirectDifferential:
     def __init__(self, variant='symmetric_ode', rate=1000.0, **options):
         self.simulation = Simulation(variant, 1.0 / rate, **options)
         self.snapshots = []
+        self._ticks = Ticks(self.simulation, rate)
 
     def run(self, law, seconds=None, until=None):
         """
@@ -31,6 +33,8 @@ class DirectDifferential:
         :return: the ``Record`` of this run.
         """
         count = ticks_of(seconds, until, self.simulation)
+        if not self.simulation.ticks:   # it may have been reset
+            self._ticks.restart()
         step, snapshot, first = self.simulation.step, self.simulation.snapshot(), len(
             self.snapshots)
         while count is None or len(self.snapshots) - first < count:
@@ -38,14 +42,50 @@ class DirectDifferential:
             with_forces = isinstance(demand, (tuple, list)) and len(demand) == 2
             snapshot = step(*demand) if with_forces else step(demand)
             self.snapshots.append(snapshot)
+            self._ticks.append((*demand[0], *demand[1]) if with_forces else tuple(demand),
+                               snapshot)
             if until and until(snapshot):
                 break
         return Record.of(self.simulation, self.snapshots[first:])
+
+    def save_bag(self, path):
+        """
+        Write a bag of all runs since the start of the simulation; it needs rosbags.
+
+        Its topics, stamps and quality of service are those of a node in lockstep.
+
+        :param path: a folder, in place of a bag that may be there.
+        """
+        self._ticks.save(path)
 
     @property
     def record(self):
         """The ``Record`` of all runs."""
         return Record.of(self.simulation, self.snapshots)
+
+
+class Ticks:
+    """What was commanded and came out since the last start, for a bag."""
+
+    def __init__(self, simulation, rate, prefix=''):
+        self._simulation, self._rate, self._prefix = simulation, rate, prefix
+        self.restart()
+
+    def restart(self):
+        """Begin with the state as it is."""
+        self._start, self._ticks = self._simulation.snapshot(), []
+
+    def append(self, command, snapshot):
+        """Take a tick: a value for each port, and for each clutch if any, and the end of it."""
+        self._ticks.append((command, snapshot))
+
+    def save(self, path):
+        """Write a bag in a folder, in place of one that may be there; it needs rosbags."""
+        with TickBag(path, self._simulation.mechanism, self._rate, self._prefix,
+                     instead=True) as bag:
+            bag.start(self._start)
+            for command, snapshot in self._ticks:
+                bag.tick(command, snapshot)
 
 
 def ticks_of(seconds, until, simulation):

@@ -7,7 +7,7 @@ import os
 import time
 
 from dm_ros.files.record import Record
-from dm_ros.testing.direct import ticks_of
+from dm_ros.testing.direct import Ticks, ticks_of
 
 PATIENCE = 10.0   # s of real time without a tick
 LAST_ANSWER = 0.5   # s of real time for the answer to the last state, before a reset
@@ -66,6 +66,8 @@ class LockstepDifferential:
                 Parameter(name, value=value) for name, value in self._options.items()])
             self.node.control.running.clear()
             self.node.on_tick = self._on_tick
+            settings = self.node.plant.settings
+            self._ticks = Ticks(self.simulation, settings.rate, settings.joint_prefix)
             stack.callback(self.node.close)
             self.executor.add_node(self.node)
             self.node.start()
@@ -109,6 +111,7 @@ class LockstepDifferential:
             self._unanswered -= self.node.inputs.discard()
         with self.node.control.lock:
             self.node.plant.reset()
+            self._ticks.restart()
         self._unanswered = 0
 
     def run(self, seconds=None, until=None):
@@ -154,6 +157,16 @@ class LockstepDifferential:
                     '/differential/joint_states with /differential/torques?')
         return Record.of(self.simulation, self.snapshots[first:])
 
+    def save_bag(self, path):
+        """
+        Write a bag of all runs since the last reset; it needs rosbags.
+
+        It has the topics of the node, with what it was commanded in each tick.
+
+        :param path: a folder, in place of a bag that may be there.
+        """
+        self._ticks.save(path)
+
     @property
     def record(self):
         """The ``Record`` of all runs."""
@@ -161,6 +174,7 @@ class LockstepDifferential:
 
     def _on_tick(self, snapshot):
         self.snapshots.append(snapshot)
+        self._ticks.append(self.node.plant.inputs.in_force(0), snapshot)
         if self._last(snapshot):
             self.node.control.running.clear()
 

@@ -15,8 +15,8 @@ Fixtures for the tests of a controller, active in pytest as soon as dm_ros is in
         record = vehicle.run(seconds=5.0)
         assert abs(record.slip[record.time > 0.4]).max() < 5.0
 
-With ``--differential-records FOLDER`` a failing test leaves the CSV and the picture of each of
-its differentials there.
+With ``--differential-records FOLDER`` a failing test leaves the CSV, the picture and, where
+rosbags is installed, the bag of each of its differentials there.
 """
 
 from contextlib import ExitStack
@@ -30,7 +30,7 @@ FAILED = pytest.StashKey()
 def pytest_addoption(parser):
     parser.getgroup('dm_ros').addoption(
         '--differential-records', metavar='FOLDER',
-        help='where a failing test leaves the CSV and the picture of its differentials')
+        help='where a failing test leaves the CSV, the picture and the bag of its differentials')
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -72,6 +72,7 @@ def leave_records(request, differentials):
     folder = request.config.getoption('--differential-records')
     if not folder or not request.node.stash.get(FAILED, False):
         return
+    from dm_ros.files.bag import has_rosbags
     folder = request.config.rootpath / folder
     folder.mkdir(parents=True, exist_ok=True)
     name = re.sub(r'[^\w.-]+', '_', request.node.nodeid)
@@ -79,3 +80,5 @@ def leave_records(request, differentials):
         if made.snapshots:
             made.record.save_csv(folder / f'{name}_{number}.csv')
             made.record.save_plot(folder / f'{name}_{number}.png')
+            if has_rosbags():
+                made.save_bag(folder / f'{name}_{number}_bag')

@@ -9,7 +9,7 @@ records what the node publishes, reports it, and writes a CSV and a picture.
 """
 
 import argparse
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 import json
 import os
 from pathlib import Path
@@ -19,6 +19,7 @@ import sys
 import time
 
 from dm_ros.ending import run_command, Signalled
+from dm_ros.files.bag import Bag, has_rosbags, require_rosbags
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
@@ -120,17 +121,27 @@ def simulation_of(arguments):
     return simulation, values
 
 
+def bag_of(arguments, simulation):
+    """Return the ``Bag`` for a run, or a context of none where none can be written."""
+    if has_rosbags():
+        return Bag(arguments.out / f'{simulation.variant}_bag', instead=True)
+    return nullcontext()
+
+
 def run_processes(arguments, simulation, values):
     """Return the recorder after a run of the two processes."""
     namespace = f'/demo_{os.getpid()}'   # even in a shared domain nobody else is heard
     parameters = ['--ros-args', '-r', f'__ns:={namespace}']
     for name, value in values.items():   # the file may name the node without the namespace
         parameters += ['-p', f'{name}:={json.dumps(value)}']
-    with Recorder(f'{namespace}/differential', simulation.mechanism) as recorder:
+    with (bag_of(arguments, simulation) as bag,
+          Recorder(f'{namespace}/differential', simulation.mechanism) as recorder):
         with process('differential', *parameters) as node:
             wait(recorder.poll, 'state of the differential', node)
             wait(next_report(recorder), 'report of the differential', node)
             recorder.clear()
+            if bag:
+                recorder.record_in(bag, '/differential')
             with process('play_torques', '--variant', simulation.variant,
                          '--joint-prefix', values.get('joint_prefix', ''),
                          '--ros-args', '-r', f'__ns:={namespace}') as player:
@@ -195,6 +206,11 @@ def run_and_write(arguments, simulation, values):
     record.save_plot(png)
     print('\n'.join(report(record, recorder.missed, rate)))
     print(f'\nwritten       {csv}\n              {png}')
+    try:
+        require_rosbags()
+        print(f'              {arguments.out / variant}_bag')
+    except ValueError as error:
+        print(f'no bag        {error}')
 
 
 def main(args=None):

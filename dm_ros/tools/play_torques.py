@@ -4,9 +4,11 @@
 """Publish torques to a differential node: a built-in load, or a CSV file."""
 
 import argparse
-import math
+from collections import deque
+from contextlib import ExitStack
 import sys
 import time
+from typing import Callable, NamedTuple
 
 import rclpy
 from rclpy.duration import Duration
@@ -17,25 +19,34 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 
 from dm_ros.ending import ignore_signals, run_command
+from dm_ros.files.bag import Bag
 from dm_ros.files.parameter_file import read_parameter_file
+from dm_ros.files.published import Commands
+from dm_ros.files.recorded_drive import is_bag, read_drive
 from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import (
     equipped,
+    Mechanism,
     MECHANISMS,
     variant_named,
     VARIANTS,
     WITH_CLUTCHES,
 )
+from dm_ros.ros.recorder import Taps
 from dm_ros.ros.transport import prefer_udp
 from dm_ros.settings import NodeParameters, port_parameters, speed_ports
 from dm_ros.tools.passed_over import warn
 from dm_ros.tools.progress import progress
 from dm_ros.tools.tables import add_ignore_columns, remarks
 
+LOOK = 0.1          # s between two looks at what is to be recorded
+LAST_ANSWER = 0.2   # s that a recording goes on after the load is off
+
 EPILOG = """\
 CSV is a file as `simulate` reads it: a header "time,<shaft>,..." with every input shaft, and a
 row's torques hold until the time of the next row, those of the last row beyond it. A file that
-begins later than 1000 s, as at an epoch, is played from its first row on. Forces on
+begins later than 1000 s, as at an epoch, is played from its first row on. A bag, a folder or an
+.mcap file, is played as `simulate` reads it: what was in force in each tick. Forces on
 clutches, in columns <clutch>_clutch, are played where CSV has any. Where FILE has a speed port
 (port.<shaft>.kind: speed), the column of its shaft is the speed outside in rad/s. Without
 --duration the last time ends the playing. All goes to the topic <node>/torques, in one message. A
@@ -58,10 +69,13 @@ def parser():
     family.add_argument('--params', metavar='FILE',
                         help='the same by the variant in the ROS 2 parameter file of the node, '
                         'and which ports take a speed')
-    result.add_argument('--torques', metavar='CSV', help='play this file, not the built-in load')
+    result.add_argument('--torques', metavar='CSV',
+                        help='play this file, or bag, not the built-in load')
     add_ignore_columns(result, 'CSV')
-    result.add_argument('--rate', type=float, default=100.0, metavar='HZ',
-                        help='messages in a second; default: 100')
+    result.add_argument('--rate', type=float, metavar='HZ',
+                        help='messages in a second; default: 100, or the ticks of a bag')
+    result.add_argument('--record', metavar='FOLDER',
+                        help='record the node in a bag, a new folder, while it plays')
     result.add_argument('--duration', type=_positive, metavar='S',
                         help='how long to play; default: to the end of CSV, or endless')
     result.add_argument('--node', default='differential', metavar='NAME',
@@ -91,36 +105,40 @@ def _positive(text):
 class Player:
     """Publishes torques, outside speeds, and forces on clutches, to a node's topic ``torques``."""
 
-    def __init__(self, node, target, ports, prefix=''):
-        """:param target: name of the differential; prefix: before the names of the ports."""
-        self._node, self._ports = node, ports
+    def __init__(self, node, target, ports, prefix='', taps=None):
+        """
+        Make the publisher.
+
+        :param target: name of the differential; prefix: before the names of the ports.
+        :param taps: ``Taps`` to be polled, if any.
+        """
+        self._node, self._taps = node, taps
         reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
         self._publisher = node.create_publisher(JointState, topic_of(target), reliable)
-        self._message = JointState(name=[prefix + port.name for port in ports])
+        self._idle, self._commands = [port.idle for port in ports], Commands(ports, prefix)
+        self._message = JointState(name=self._commands.names)
 
     def wait(self, seconds):
         """Wait for a subscriber, at most so long, and tell how it went."""
         log, topic = self._node.get_logger(), self._publisher.topic_name
         deadline = time.monotonic() + seconds
-        if not self._publisher.get_subscription_count() and seconds > 0.0:
+        if not self._is_connected() and seconds > 0.0:
             log.info(f'waiting up to {seconds:g} s for a subscriber of {topic}')
-        while not self._publisher.get_subscription_count():
+        while not self._is_connected():
             if time.monotonic() >= deadline:
                 log.warning(f'{topic} has no subscriber, playing all the same')
                 return
             time.sleep(0.02)
         log.info(f'playing to {topic}')
 
+    def _is_connected(self):
+        return self._publisher.get_subscription_count() > 0 and (
+            self._taps is None or self._taps.is_connected())
+
     def publish(self, values):
         """Publish one value for each port, in its unit; None for a speed that is none."""
         self._message.header.stamp = self._node.get_clock().now().to_msg()
-        is_speed = [port.kind == 'speed' for port in self._ports]
-        numbers = [math.nan if value is None else float(value) for value in values]
-        self._message.effort = [math.nan if speed else number
-                                for speed, number in zip(is_speed, numbers, strict=True)]
-        if any(is_speed):
-            self._message.velocity = [number if speed else math.nan
-                                      for speed, number in zip(is_speed, numbers)]
+        _, self._message.velocity, self._message.effort = self._commands.arrays(values)
         self._publisher.publish(self._message)
 
     def play(self, torques_at, rate, count=None):
@@ -137,12 +155,20 @@ class Player:
                 due = max(n + 1, int((time.monotonic() - start) * rate))
                 bar.update(due - n)
                 n = due
-                time.sleep(max(0.0, start + n / rate - time.monotonic()))
+                self._sleep_until(start + n / rate)
 
     def unload(self):
         """Publish what an idle port has and wait until it has arrived."""
-        self.publish([port.idle for port in self._ports])
+        self.publish(self._idle)
         self._publisher.wait_for_all_acked(Duration(seconds=1))
+        if self._taps:
+            self._sleep_until(time.monotonic() + LAST_ANSWER)
+
+    def _sleep_until(self, end):
+        while (left := end - time.monotonic()) > 0.0:
+            time.sleep(min(left, LOOK) if self._taps else left)
+            if self._taps:
+                deque(self._taps.poll(), 0)
 
 
 def full_name(node, target):
@@ -156,14 +182,26 @@ def topic_of(target):
     return f'{target.rstrip("/")}/torques'
 
 
+class Load(NamedTuple):
+    """What to play."""
+
+    mechanism: Mechanism
+    ports: tuple         # to which it is played
+    rate: float          # messages in a second
+    values_at: Callable  # of n: a value for each port
+    count: int | None    # of messages
+    prefix: str          # before the names in messages
+
+
 def load(arguments, target='/differential'):
     """
-    Return what to play: rate, ports, a function of n, the number of messages or None, a prefix.
+    Return what to play, as a ``Load``.
 
     :param target: full name of the node for which FILE counts.
     :raises ValueError: for a CSV that is not as it should be, or none where one is needed.
     """
-    rate, count = NodeParameters().changed({'rate': arguments.rate}).rate, None
+    rate, count = 100.0 if arguments.rate is None else arguments.rate, None
+    NodeParameters(rate=rate)   # refuses what is none
     values = read_parameter_file(arguments.params, target) if arguments.params else {}
     prefix = arguments.joint_prefix
     if prefix is None:
@@ -176,10 +214,19 @@ def load(arguments, target='/differential'):
     mechanism = equipped(WITH_CLUTCHES[mechanism.name], mechanism.parameters(), speeds)
     ports = mechanism.ports
     if arguments.torques:
-        table = read_torque_file(arguments.torques, ports, mechanism.clutch_moments,
-                                 arguments.ignore_columns)
+        if is_bag(arguments.torques):
+            drive = read_drive(arguments.torques, mechanism, NodeParameters().changed(
+                NodeParameters.part_of(values)).rate, default=target)
+            table, lines = drive.table, drive.remarks
+            rate = 1 / drive.dt if arguments.rate is None else rate
+        else:
+            table = read_torque_file(arguments.torques, ports, mechanism.clutch_moments,
+                                     arguments.ignore_columns)
+            lines = ()
         held = table.held(1 / rate)
-        for line in remarks(arguments.torques, table, 1 / rate, lambda dt: f'--rate {1 / dt:.9g}'):
+        lines = *(f'{arguments.torques}: {line}' for line in lines), *remarks(
+            arguments.torques, table, 1 / rate, lambda dt: f'--rate {1 / dt:.9g}')
+        for line in lines:
             print('play_torques:', line, file=sys.stderr, flush=True)
         torques_at, count = held.at, len(held)
         if len(torques_at(0)) > len(ports):
@@ -191,27 +238,33 @@ def load(arguments, target='/differential'):
             return mechanism.load(n / rate)
     if arguments.duration:
         count = max(1, round(arguments.duration * rate))
-    return rate, ports, torques_at, count, prefix
+    return Load(mechanism, ports, rate, torques_at, count, prefix)
 
 
 def run(args):
     """Play what the command line says, and unload in the end."""
-    player = None
     try:
         arguments = parser().parse_args(remove_ros_args(args)[1:])
         prefer_udp()
         # rclpy's own handlers would shut down before the zero torques are out
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node('play_torques')
-        rate, ports, torques_at, count, prefix = load(
-            arguments, full_name(node, arguments.node))
-        player = Player(node, arguments.node, ports, prefix)
-        player.wait(arguments.wait)
-        player.play(torques_at, rate, count)
+        target = full_name(node, arguments.node)
+        what = load(arguments, target)
+        with ExitStack() as stack:
+            taps = None
+            if arguments.record:
+                taps = Taps(node, target, what.mechanism)
+                taps.record(stack.enter_context(Bag(arguments.record, whole=False)))
+            player = Player(node, arguments.node, what.ports, what.prefix, taps)
+            try:
+                player.wait(arguments.wait)
+                player.play(what.values_at, what.rate, what.count)
+            finally:
+                ignore_signals()
+                player.unload()
     finally:
         ignore_signals()
-        if player:
-            player.unload()
         rclpy.try_shutdown()
 
 

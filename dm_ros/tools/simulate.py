@@ -13,11 +13,13 @@ import sys
 import numpy as np
 
 from dm_ros.ending import run_command
+from dm_ros.files.bag import TickBag
 from dm_ros.files.columns import as_row, column_names, write_csv
 from dm_ros.files.output import replacing
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.plot import require_matplotlib
 from dm_ros.files.record import Record
+from dm_ros.files.recorded_drive import is_bag, read_drive
 from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
@@ -28,7 +30,7 @@ from dm_ros.tools.progress import progress
 from dm_ros.tools.tables import add_ignore_columns, remarks, unit_hint
 
 MANY_TICKS, MOST_TICKS = 10**6, 10**7   # beyond: their number is told before, needs --yes
-CELL = 17   # bytes of CSV, about
+CELL, NUMBER, MESSAGES = 17, 8, 1000   # bytes: of CSV, in memory, of a tick in a bag; about
 EPILOG = """\
 IN.csv has a header "time,<shaft>,..." with every input shaft of the variant, in any order
 (symmetric: pinion, left, right; lsd: carrier, front, rear), then rows of s and N m. Columns
@@ -46,8 +48,17 @@ OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), 
 (N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse), clutch_force.<clutch> (N): a row
 for the start, then one for the end of each tick. Without --out and --plot it goes to stdout.
 
+IN may be a bag instead, a folder or an .mcap file: the torques and forces that were in force in
+each tick, from ~/joint_states and ~/clutches, and the speeds outside that were commanded. What was
+recorded in lockstep gives the same bits again. The tick is that of the recording, unless --dt says
+more.
+
+--bag FOLDER makes a bag of the run, with the topics, stamps and quality of service of a node
+/differential in lockstep, what it was commanded among them.
+
 Of FILE, a ROS 2 parameter file, these count: variant, the parameters of the mechanism, loss_law,
-rate, substeps, power_flow_deadband, initial_velocity and ports.
+rate, substeps, power_flow_deadband, initial_velocity, ports, and for bags joint_prefix and
+torque_timeout.
 """
 
 
@@ -61,15 +72,19 @@ def parser():
                         help='what gears and bearings lose; default: loss_law of FILE, '
                         f'else {NodeParameters().loss_law}')
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
-    result.add_argument('--torques', metavar='IN.csv', required=True, help='torques over time')
+    result.add_argument('--torques', metavar='IN', required=True,
+                        help='torques over time: a CSV file, or a bag')
     add_ignore_columns(result, 'IN.csv')
+    result.add_argument('--node', metavar='NAME', help='full name of the node in the bag IN; '
+                        'default: the only differential in it')
     result.add_argument('--dt', type=_tick, metavar='S',
                         help='length of a tick; default: 1/rate of FILE, '
-                        f'else {1 / NodeParameters().rate:g}; auto: that, or shorter so that each '
-                        'row of IN.csv is in force')
+                        f'else {1 / NodeParameters().rate:g}, but that of a bag IN; auto: that, '
+                        'or shorter so that each row of IN.csv is in force')
     result.add_argument('--yes', action='store_true', help='run more than 1e7 ticks')
     result.add_argument('--out', metavar='OUT.csv', help='where the results go')
     result.add_argument('--plot', metavar='OUT.png', help='where a picture of them goes, as PNG')
+    result.add_argument('--bag', metavar='FOLDER', help='where a bag of them goes, a new folder')
     return result
 
 
@@ -91,10 +106,12 @@ def announced(arguments, table, simulation, torques):
     """Tell what a user may not know before a run; raise ValueError where ``--yes`` is needed."""
     ticks, columns = len(torques), len(column_names(simulation))
     sizes = []
-    if arguments.out or not arguments.plot:
+    if written_as_csv(arguments):
         sizes.append(f'{size(ticks * columns * CELL)} of CSV')
+    if arguments.bag:
+        sizes.append(f'{size(ticks * (columns * NUMBER + MESSAGES))} of a bag')
     if arguments.plot:
-        sizes.append(f'{size(ticks * columns * array("d").itemsize)} of memory')
+        sizes.append(f'{size(ticks * columns * NUMBER)} of memory')
     needs = f'{ticks} ticks of {simulation.dt:.6g} s, about {" and ".join(sizes)}'
     if ticks > MOST_TICKS and not arguments.yes:
         raise ValueError(f'{arguments.torques}: time: {needs}, run only with --yes'
@@ -106,12 +123,23 @@ def announced(arguments, table, simulation, torques):
         print('simulate:', needs, file=sys.stderr, flush=True)
 
 
-def rows_of(simulation, torques):
+def written_as_csv(arguments):
+    """Return whether the results go to a CSV, if only on stdout."""
+    return arguments.out or not (arguments.plot or arguments.bag)
+
+
+def rows_of(simulation, torques, bag=None):
     """Run a simulation; yield the start and the end of each tick as rows of a record."""
-    yield as_row(simulation.snapshot())
+    snapshot = simulation.snapshot()
+    if bag:
+        bag.start(snapshot)
+    yield as_row(snapshot)
     count = len(simulation.inputs)
     for row in progress(torques, total=len(torques)):
-        yield as_row(simulation.step(row[:count], row[count:] or NO_FORCE))
+        snapshot = simulation.step(row[:count], row[count:] or NO_FORCE)
+        if bag:
+            bag.tick(row, snapshot)
+        yield as_row(snapshot)
 
 
 def kept(rows, numbers):
@@ -121,12 +149,41 @@ def kept(rows, numbers):
         yield row
 
 
+def loaded(arguments, variant, values):
+    """Return a simulation and the table of the torques for it."""
+    is_auto = arguments.dt == 'auto'
+    simulation = make_simulation(variant, values, None if is_auto else arguments.dt)
+    mechanism = simulation.mechanism
+    warn('simulate', arguments.params, values, mechanism)
+    if is_bag(arguments.torques):
+        if arguments.ignore_columns:
+            raise ValueError('--ignore-columns: a bag has no columns')
+        timeout = NodeParameters().changed(NodeParameters.part_of(values)).torque_timeout
+        drive = read_drive(arguments.torques, mechanism, 1 / simulation.dt, arguments.node,
+                           timeout)
+        for line in drive.remarks:
+            print(f'simulate: {arguments.torques}: {line}', file=sys.stderr)
+        dt = drive.dt if is_auto or arguments.dt is None else arguments.dt
+        return make_simulation(variant, values | drive.values, dt), drive.table
+    if arguments.node:
+        raise ValueError('--node: only a bag has nodes')
+    table = read_torque_file(arguments.torques, mechanism.ports, mechanism.clutch_moments,
+                             arguments.ignore_columns)
+    if is_auto:
+        try:
+            dt = table.tick_for_all(simulation.dt)
+        except ValueError as error:
+            raise ValueError(f'{arguments.torques}: {error}') from None
+        simulation = make_simulation(variant, values, dt)
+    return simulation, table
+
+
 def run(arguments):
     """Do what the command line says; raise ValueError or OSError where it cannot be done."""
     if arguments.plot:
         require_matplotlib()   # before a run that may take minutes
-    files = [os.path.realpath(path) for path in (arguments.torques, arguments.params,
-                                                 arguments.out, arguments.plot) if path]
+    files = [os.path.realpath(path) for path in (
+        arguments.torques, arguments.params, arguments.out, arguments.plot, arguments.bag) if path]
     if len(set(files)) < len(files):
         raise ValueError(f'{max(files, key=files.count)}: given for two files')
     values = read_parameter_file(arguments.params) if arguments.params else {}
@@ -135,27 +192,23 @@ def run(arguments):
     variant = arguments.variant or values.get('variant')
     if variant is None:
         raise ValueError('--variant: it is needed where no FILE has the parameter variant')
-    is_auto = arguments.dt == 'auto'
-    simulation = make_simulation(variant, values, None if is_auto else arguments.dt)
-    mechanism = simulation.mechanism
-    warn('simulate', arguments.params, values, mechanism)
-    table = read_torque_file(arguments.torques, mechanism.ports, mechanism.clutch_moments,
-                             arguments.ignore_columns)
+    simulation, table = loaded(arguments, variant, values)
     try:
-        if is_auto:
-            simulation = make_simulation(variant, values, table.tick_for_all(simulation.dt))
         torques = table.held(simulation.dt)
     except ValueError as error:
         raise ValueError(f'{arguments.torques}: {error}') from None
     announced(arguments, table, simulation, torques)
     with ExitStack() as stack:
-        file, rows, numbers = None, rows_of(simulation, torques), array('d')
+        bag = arguments.bag and stack.enter_context(TickBag(
+            arguments.bag, simulation.mechanism, 1 / simulation.dt,
+            NodeParameters().changed(NodeParameters.part_of(values)).joint_prefix))
+        file, rows, numbers = None, rows_of(simulation, torques, bag), array('d')
         if arguments.plot:
             picture = stack.enter_context(replacing(arguments.plot, 'wb'))
             rows = kept(rows, numbers)
         if arguments.out:
             file = stack.enter_context(replacing(arguments.out, 'w'))
-        elif not arguments.plot:
+        elif written_as_csv(arguments):
             # a file of its own: the interpreter stumbles at its end over a sys.stdout that failed
             file = stack.enter_context(open(1, 'w', closefd=False))
         try:
@@ -176,8 +229,8 @@ def run(arguments):
 def main(args=None):
     """Run the tool ``simulate`` and return its exit code."""
     arguments = parser().parse_args(args)
-    outputs = [path for path in (arguments.out, arguments.plot) if path] or ['stdout']
-    return run_command('simulate', lambda: run(arguments), ', '.join(outputs))
+    outputs = [path for path in (arguments.out, arguments.plot, arguments.bag) if path]
+    return run_command('simulate', lambda: run(arguments), ', '.join(outputs or ['stdout']))
 
 
 if __name__ == '__main__':

@@ -3,6 +3,7 @@
 
 """Fixtures for tests over real topics: each test has its own context in its own domain."""
 
+from contextlib import ExitStack
 import math
 import os
 from pathlib import Path
@@ -11,6 +12,7 @@ import sys
 import time
 
 from command_line import asked
+from processes import command, Forked
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -120,6 +122,14 @@ def ros(monkeypatch):
         user = Ros(monkeypatch, domain)
         yield user
         user.close()
+
+
+@pytest.fixture
+def play(ros):
+    """Return a function that starts play_torques and returns the process, ended after the test."""
+    with ExitStack() as stack:
+        yield lambda *arguments: stack.enter_context(
+            Forked(command('play_torques'), *arguments))
 
 
 class SteadyClock:

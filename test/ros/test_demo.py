@@ -14,6 +14,7 @@ import pytest
 
 from dm_ros.files.columns import column_names
 from dm_ros.motion.simulation import Simulation
+from dm_ros.tools.simulate import main as simulate
 
 DEMO = command('demo')
 VARIANTS = ('symmetric_dae', 'lsd_lagged')
@@ -64,6 +65,21 @@ def test_it_records_what_the_node_publishes_and_draws_it(runs, variant):
     for column in (driving, 'velocity.carrier'):
         assert any(float(row[column]) for row in rows)
     assert (folder / f'{variant}.png').read_bytes().startswith(b'\x89PNG')
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_it_leaves_a_bag_whose_run_is_that_of_the_node(runs, variant, tmp_path):
+    pytest.importorskip('rosbags', reason='bags need rosbags: the extra bag')
+    folder, _, output, _ = runs[variant]
+    assert f'{variant}_bag' in output
+    assert simulate(['--variant', variant, '--loss-law', LAWS[variant], '--torques',
+                     str(folder / f'{variant}_bag'), '--out', str(tmp_path / 'again.csv')]) == 0
+    with (open(folder / f'{variant}.csv', newline='') as file,
+          open(tmp_path / 'again.csv', newline='') as again):
+        name = 'velocity.carrier'
+        speeds, ran = ([float(row[name]) for row in csv.DictReader(one)] for one in (file, again))
+    first = ran.index(speeds[1]) - 1   # the record begins with the last tick before the load
+    assert ran[first:][:len(speeds)] == speeds
 
 
 def test_a_bad_variant_or_an_unwritable_folder_ends_it_with_one_line(tmp_path):

@@ -3,11 +3,9 @@
 
 """``play_torques`` over real topics, as a process of its own."""
 
-from contextlib import ExitStack
 from pathlib import Path
 import signal
 
-from processes import command, Forked
 import pytest
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
@@ -16,14 +14,6 @@ from dm_ros.mechanism.variants import MECHANISMS
 from dm_ros.tools.play_torques import load, parser
 
 PRESETS = Path(__file__).parents[2] / 'config' / 'presets'
-
-
-@pytest.fixture
-def play(ros):
-    """Return a function that starts the tool and returns the process, ended after the test."""
-    with ExitStack() as stack:
-        yield lambda *arguments: stack.enter_context(
-            Forked(command('play_torques'), *arguments))
 
 
 def listen(ros, topic='/differential/torques'):
@@ -83,8 +73,9 @@ def test_plays_a_file_to_its_end(ros, play, tmp_path):
     file.write_text('right,time,left,pinion\n' + ''.join(
         f'{right},{n / 50},{left},{pinion}\n' for n, (pinion, left, right) in enumerate(rows)))
     arguments = ['--torques', str(file), '--wait', '60']
-    _, _, torques_at, count, _ = load(parser().parse_args(arguments))
-    assert [torques_at(n) for n in range(count)] == [row for row in rows[:-1] for _ in range(2)]
+    played = load(parser().parse_args(arguments))
+    assert [played.values_at(n) for n in range(played.count)] == [
+        row for row in rows[:-1] for _ in range(2)]
     messages = listen(ros)
     process = play(*arguments)
     ros.until(lambda: process.returncode is not None)
@@ -101,8 +92,8 @@ def test_a_log_is_played_from_its_begin_and_what_it_loses_is_told(tmp_path, caps
     file.write_text('time,gear,pinion,left,right\n' + ''.join(
         f'{1748873654 + n / 1000:.3f},D,{n},-1,-1\n' for n in range(101)))
     arguments = parser().parse_args(['--torques', str(file), '--ignore-columns', 'gear'])
-    _, _, torques_at, count, _ = load(arguments)
-    assert [torques_at(n)[0] for n in range(count)] == list(range(0, 100, 10))
+    played = load(arguments)
+    assert [played.values_at(n)[0] for n in range(played.count)] == list(range(0, 100, 10))
     begin, lost = capsys.readouterr().err.splitlines()
     assert begin.startswith(f'play_torques: {file}: time 0 is 1748873654.0 s in the file')
     assert lost == (f'play_torques: {file}: 90 of 101 rows are never in force in ticks of '
