@@ -57,12 +57,14 @@ function show(description) {
     : scene.gears.exact ? '' : 'ratios and numbers of gears are drawn near the true ones';
 }
 
-// The command that starts a node of this name.
+// The commands that start a node of this name, and a load.
 function how(node) {
   const [, space, name] = node.match(/^(.*)\/([^/]+)$/);
-  const remaps = [...(space ? [`-r __ns:=${space}`] : []),
-    ...(name === 'differential' ? [] : [`-r __node:=${name}`])];
-  return ['ros2 run dm_ros differential --ros-args', ...remaps, '-p variant:=lsd_ode'].join(' ');
+  const inSpace = space ? ` -r __ns:=${space}` : '';
+  const renamed = name === 'differential' ? '' : ` -r __node:=${name}`;
+  return `ros2 run dm_ros differential --ros-args -p variant:=lsd_ode${inSpace}${renamed}\n`
+    + `ros2 run dm_ros play_torques --variant lsd_ode${renamed && ` --node ${name}`}`
+    + `${inSpace && ` --ros-args${inSpace}`}`;
 }
 
 function ticks({emptied, rows, now}) {
