@@ -4,6 +4,7 @@
 """Serve a page that shows a running differential live, for a browser on this machine."""
 
 import argparse
+import os
 import sys
 import threading
 
@@ -23,6 +24,7 @@ from dm_ros.watch.server import Server
 from dm_ros.watch.viewers import Viewers
 
 PORT = 8350
+NICE = 10       # a node on the same cores comes first
 PERIOD = 0.04   # s from one look at what has come to the next, and so from event to event
 EPILOG = """\
 The page is at the URL that is printed, until Ctrl-C or SIGTERM. It shows the node while it runs,
@@ -65,6 +67,7 @@ def watch(args, arguments, ended):
     server = Server(arguments.host, arguments.port, viewers,
                     (lambda *request: commander.command(*request)) if arguments.control else None)
     try:
+        os.nice(NICE)   # also the threads of the middleware, which begin below
         prefer_udp()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node('watch')

@@ -95,7 +95,7 @@ def start(ros):
         def start(*arguments):
             process = stack.enter_context(
                 Forked(command('watch'), '--port', 0, *arguments))
-            process.says('watching ')
+            process.says('/\n')
             return process, int(re.search(r':(\d+)/\n', process.output).group(1))
         yield start
 

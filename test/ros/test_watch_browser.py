@@ -108,7 +108,7 @@ class Screen:
             f'return [...document.querySelectorAll("[data-{kind}]")].map('
             f'e => [e.dataset.{kind}, e.textContent])')
         return {shaft: float(text.split()[0].replace('\N{MINUS SIGN}', '-'))
-                for shaft, text in found if text}
+                for shaft, text in found if text != '\N{EN DASH}'}
 
     def different(self, count):
         """Return how many of some pictures in a row differ."""
@@ -139,7 +139,7 @@ def screen(ros, chromium):
 
     def screen(*arguments):
         processes.append(Forked(command('watch'), '--port', 0, *arguments))
-        processes[-1].says('watching ')
+        processes[-1].says('/\n')
         url = re.search(r'http\S+', processes[-1].output).group()
         return Screen(chromium, url)
     yield screen

@@ -37,6 +37,7 @@ function show(description) {
   $('kind').textContent = scene
     ? `${scene.variant}, ${scene.rate} Hz, ${scene.mode}, ${scene.law} law of losses` : '';
   $('waiting').hidden = Boolean(scene);
+  document.querySelector('main').classList.toggle('waiting', !scene);
   document.querySelector('.node').textContent = description.node;
   $('refusal').hidden = !description.refusal;
   $('refusal').textContent = `It is there, but cannot be shown: ${description.refusal}`;

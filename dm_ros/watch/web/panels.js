@@ -9,7 +9,7 @@ import {make, number, power, words} from './words.js';
 // Where the label of each shaft has its place around the drawing.
 const PLACES = {first: 'bottom left', second: 'bottom right', satellite: 'top centre'};
 const DRIVEN = {carrier: 'top right', pinion: 'top left'}, BARE = {carrier: 'top left'};
-const NICE = [1, 2, 5, 10];
+const NICE = [1, 2, 5, 10], NOTHING = '\u2013';
 const MEMORY = 10;   // s for which the most of a power is remembered
 
 // The least of 1, 2, 5, 10, 20, ... that is not below a value.
@@ -63,7 +63,7 @@ export class Labels {
       const index = role(scene.shafts, shaft), place = places[colours.names[index]];
       const label = make('div', `label ${place}`);
       label.style.borderColor = colours.lines[index];
-      const speed = make('span', 'number'), torque = make('span', 'number');
+      const [speed, torque] = [0, 1].map(() => make('span', 'number', NOTHING));
       speed.dataset.speed = torque.dataset.torque = shaft;
       label.append(make('b', '', shaft), speed);
       if (scene.inputs.includes(shaft)) label.append(torque);
@@ -111,11 +111,11 @@ export class Legend {
       context.fillStyle = this.colours.css(this.colours[ramp](x / 199));
       context.fillRect(x, 0, 1, 1);
     }
-    this[ramp] = make('span', 'number');
+    this[ramp] = make('span', 'number', NOTHING);
     scale.append(make('span', '', '0'), bar, this[ramp]);
     const list = make('dl');
     for (const name of names) {
-      const row = make('div'), chip = make('span', 'chip'), value = make('dd', 'number');
+      const row = make('div'), chip = make('span', 'chip'), value = make('dd', 'number', NOTHING);
       value.dataset.power = name;
       row.append(chip, make('dt', '', words(name).replace(/ (mesh|clutch)$/, '')), value);
       list.append(row);
