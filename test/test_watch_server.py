@@ -16,6 +16,7 @@ import pytest
 
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.watch.commands import Commands, WORKS
+from dm_ros.watch.guard import Guard
 from dm_ros.watch.live import Live
 from dm_ros.watch.scene import Scene
 from dm_ros.watch.server import CONNECTIONS, LARGEST_BODY, Server
@@ -211,8 +212,18 @@ def test_what_another_page_embeds_is_refused_and_a_link_on_it_leads_to_the_page(
 
 def test_on_all_addresses_an_address_is_served_and_a_foreign_name_is_not():
     with serving(host='0.0.0.0') as server:
-        for name, status in (('127.0.0.1', 200), ('10.1.2.3', 200), ('evil.example', 403)):
+        for name, status in (('127.0.0.1', 200), ('10.1.2.3', 200), (socket.gethostname(), 200),
+                             ('evil.example', 403)):
             assert asked(server, Host=f'{name}:{server.port}')[0] == status
+        assert server.url == f'http://{socket.gethostname()}:{server.port}/'
+
+
+def test_an_address_of_version_6_is_asked_for_in_brackets():
+    guard = Guard('::1', '::1', 8350)
+    for host, allowed in (('[::1]:8350', True), ('localhost:8350', True), ('[::1]', False),
+                          ('[::2]:8350', False), ('127.0.0.1:8350', False)):
+        assert guard.allows_host(host) == allowed, host
+    assert Guard('127.0.0.1', '127.0.0.1', 80).allows_host('127.0.0.1')
 
 
 @pytest.mark.parametrize('path', ['/', '/control', '/events'])

@@ -46,8 +46,10 @@ class Guard:
         if bound.is_loopback:
             self._names |= {'localhost'}
         self._any_address = bound.is_unspecified   # it is asked for by each address of the host
+        self.name = host   # to ask for it by
         if self._any_address:
-            self._names |= LOOPBACK | {socket.gethostname().lower()}
+            self.name = socket.gethostname()
+            self._names |= LOOPBACK | {self.name.lower()}
 
     def allows_host(self, host):
         """Return whether a ``Host`` is the server's own."""

@@ -87,8 +87,8 @@ class Server(ThreadingHTTPServer):
         self.files = files()
         self.page = page(self.token)
         self._room = threading.BoundedSemaphore(CONNECTIONS)
-        name = f'[{host}]' if ':' in host else host
-        self.url = f'http://{name}:{self.port}/'
+        name = self.guard.name
+        self.url = f'http://{f"[{name}]" if ":" in name else name}:{self.port}/'
 
     def server_bind(self):
         """Bind without a look at the name of the host, which may take long."""

@@ -15,6 +15,7 @@ export class Control {
     this.viewer = null;
     this.rows = new Map();
     this.waiting = null;   // values that a slider has and the server has not
+    this.told = {};        // values that the server has
   }
 
   show(scene) {
@@ -60,11 +61,11 @@ export class Control {
 
   // Show what all viewers command now.
   tell(values) {
+    this.told = values;
     for (const [name, row] of this.rows) {
       const touched = name in values;
       row.label.classList.toggle('untouched', !touched);
-      const busy = document.activeElement === row.field && row.field.matches(':focus');
-      if (this.waiting && name in this.waiting || row.held || busy && touched) continue;
+      if (this.waiting && name in this.waiting || row.held || row.typing) continue;
       this.#put(row, values[name] ?? 0);
     }
   }
@@ -87,7 +88,7 @@ export class Control {
     slider.setAttribute('aria-label', `${port.name} ${port.kind}`);
     field.setAttribute('aria-label', `${port.name} in ${port.unit}`);
     slider.name = field.name = port.name;
-    const row = {label, slider, field, held: false};
+    const row = {label, slider, field, held: false, typing: false};
     slider.addEventListener('pointerdown', () => { row.held = true; });
     for (const end of ['pointerup', 'pointercancel', 'blur']) {
       slider.addEventListener(end, () => { row.held = false; });
@@ -98,7 +99,10 @@ export class Control {
       field.value = String(Number(near.toPrecision(4)));
       this.#set(port.name, near);
     });
+    field.addEventListener('input', () => { row.typing = true; });
+    field.addEventListener('blur', () => { row.typing = false; });
     field.addEventListener('change', () => {
+      row.typing = false;
       const value = field.valueAsNumber;
       if (Number.isFinite(value)) {
         this.#put(row, value);
@@ -130,8 +134,10 @@ export class Control {
       const response = await fetch('control', {
         method: 'POST', body: JSON.stringify({...request, viewer: this.viewer}),
         headers: {'Content-Type': 'application/json', 'X-Watch-Token': this.token}});
-      if (!response.ok) this.#say((await response.text()).trim(), true);
-      else {
+      if (!response.ok) {
+        this.#say((await response.text()).trim(), true);
+        this.tell(this.told);
+      } else {
         const {success, message} = await response.json();
         this.#say(request.do === 'set' ? '' : `${request.do}: ${message || 'done'}`, !success);
       }

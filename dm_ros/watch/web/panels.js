@@ -46,7 +46,6 @@ export class Most {
   of(values, seconds) {
     this.seen = this.seen.filter(([time]) => time > seconds - MEMORY);
     this.seen.push([seconds, Math.max(0, ...values.map(Math.abs))]);
-    if (this.seen.length > 400) this.seen = this.seen.filter((_, i) => i % 2 || i > 300);
     return nice(Math.max(10, ...this.seen.map(([, value]) => value)));
   }
 }
