@@ -27,12 +27,13 @@ setup(
         (f'share/{NAME}/config/ros2_control', glob('config/ros2_control/*')),
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
     ],
-    package_data={NAME: ['ros/*.xml']},
+    package_data={NAME: ['ros/*.xml', 'watch/web/*', 'watch/web/uplot/*']},
     zip_safe=False,   # Fast DDS reads localhost.xml itself
     python_requires='>=3.11',
     install_requires=['numpy>=1.26', 'scipy>=1.11', 'PyYAML', 'tqdm'],
     extras_require={
         'bag': ['rosbags>=0.11.9'],
+        'browser': ['selenium>=4.11'],
         'mcap': ['mcap-ros2-support'],
         'physics': ['mujoco>=4'],
         'plot': [MATPLOTLIB],
@@ -49,6 +50,7 @@ setup(
             'play_torques = dm_ros.commands:play_torques',
             'simulate = dm_ros.commands:simulate',
             'urdf = dm_ros.commands:urdf',
+            'watch = dm_ros.commands:watch',
         ],
         'pytest11': ['dm_ros = dm_ros.testing.pytest_plugin'],
     },
