@@ -126,10 +126,10 @@ def test_in_lockstep_one_message_is_one_tick_so_nothing_else_sends_any(printed):
     assert set(found) == {'', '_states'}
 
 
-def test_with_a_speed_port_each_joint_has_both_commands(printed):
+def test_with_a_speed_port_each_shaft_has_both_commands_and_a_clutch_its_force(printed):
     found = components(printed('variant: lsd_ode, port.front.kind: speed', '--ros2-control'))
-    for end in ('', '_clutches'):
-        assert set(map(tuple, found[end].commanded.values())) == {('effort', 'velocity')}
+    for end, interfaces in (('', ('effort', 'velocity')), ('_clutches', ('effort',))):
+        assert set(map(tuple, found[end].commanded.values())) == {interfaces}
 
 
 def test_without_the_option_there_is_nothing_of_it(printed):

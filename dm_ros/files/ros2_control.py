@@ -37,7 +37,7 @@ def add_ros2_control(robot, mechanism, prefix, node, clutches):
     :param clutches: whether there are joints of its clutches.
     """
     shafts, commands = mechanism.inputs, ['effort']
-    if mechanism.half_shafts:   # then both arrays are as long as the names
+    if mechanism.half_shafts:   # then both arrays of their messages are as long as the names
         commands.append('velocity')
     sent = {'joint_commands_topic': f'{node}/torques', 'trigger_joint_command_threshold': ALWAYS}
     robot.append(Comment(' Each cycle sends a command, whatever is in force: see '
@@ -49,5 +49,5 @@ def add_ros2_control(robot, mechanism, prefix, node, clutches):
            joint_states_topic=f'{node}/joint_states')
     if clutches:
         system(robot, f'{prefix}differential_clutches',
-               [prefix + clutch.name for clutch in mechanism.actuators], commands,
+               [prefix + clutch.name for clutch in mechanism.actuators], ['effort'],
                joint_states_topic=f'{node}/clutches', **sent)
