@@ -15,9 +15,9 @@ from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 import yaml
 
 from dm_ros.files.parameter_file import read_parameter_file
-from dm_ros.mechanism.variants import variant_named
+from dm_ros.files.ros2_control import controllers_file
 from dm_ros.settings import NodeParameters
-from dm_ros.tools.bias import mechanism_of
+from dm_ros.tools.urdf import described
 
 ROWS = dict(NodeParameters().rows().values())
 # of the node, by their names
@@ -51,6 +51,8 @@ def processes(context):
         # not in parameters, where a file that is missing is passed over with a warning
         ros_arguments=['--params-file', given['params_file']] if 'params_file' in given else None,
         **shown)]
+    if given.get('ros2_control') == 'false':
+        del given['ros2_control']
     controlled = 'ros2_control' in given
     if controlled or given.get('description') == 'true':
         command = urdf_command(given, f'{namespace.rstrip("/")}/differential')
@@ -93,12 +95,10 @@ def control(given, namespace, shown):
 def installed_controllers(given):
     """Return the installed parameter file for the controllers of a mechanism."""
     values = read_parameter_file(given['params_file']) if 'params_file' in given else {}
-    values.update({name: given[name] for name in PARAMETERS if name in given})
-    if values.get('joint_prefix'):
-        raise RuntimeError('ros2_control: with a joint_prefix it must be a file with such joints')
-    mechanism = mechanism_of(values, variant_named(NodeParameters().variant).mechanism)
+    values.update({name: given[name] for name in ('variant', 'joint_prefix') if name in given})
+    node, mechanism, _ = described(values)
     return str(Path(__file__).parents[1] / 'config' / 'ros2_control'
-               / f'{mechanism.name}_controllers.yaml')
+               / controllers_file(mechanism, node.joint_prefix, node.mode == 'lockstep'))
 
 
 def urdf_command(given, node):

@@ -11,11 +11,13 @@ from hardware import components, KINDS
 import pytest
 import yaml
 
-from dm_ros.files.ros2_control import PLUGIN
+from dm_ros.files.parameter_file import read_parameter_file
+from dm_ros.files.ros2_control import controllers_file, PLUGIN
 from dm_ros.mechanism.variants import equipped, MECHANISMS
-from dm_ros.tools.urdf import main
+from dm_ros.tools.urdf import described, main
 
 FOLDER = Path(__file__).parents[1] / 'config' / 'ros2_control'
+PRESETS = FOLDER.parent / 'presets'
 BROADCASTER = 'joint_state_broadcaster/JointStateBroadcaster'
 EFFORT = 'effort_controllers/JointGroupEffortController'
 each_mechanism = pytest.mark.parametrize('name', MECHANISMS)
@@ -91,19 +93,47 @@ def test_every_joint_is_one_that_moves_in_the_urdf(name):
                       for joint in component.commanded}
 
 
-@each_mechanism
-def test_controllers_command_each_joint_once_by_what_the_description_has(name):
+@pytest.mark.parametrize('name, content', [
+    ('symmetric', 'variant: symmetric_ode'), ('lsd', 'variant: lsd_ode'),
+    ('symmetric_clutches', 'symmetric.clutch.left.friction_surfaces: 4')])
+def test_controllers_command_each_joint_once_by_what_the_description_has(name, content, printed):
     found, manager, rest = controllers(name)
+    description = printed(content, '--ros2-control')
     assert not rest and type(manager['update_rate']) is int
     assert found.pop('joint_state_broadcaster') == (BROADCASTER, {})
     assert {kind for kind, _ in found.values()} == {EFFORT}
     joints = [joint for _, parameters in found.values() for joint in parameters['joints']]
     assert sorted(joints) == sorted(
-        joint for component in components((FOLDER / f'{name}.urdf').read_text()).values()
+        joint for component in components(description).values()
         for joint, interfaces in component.commanded.items() if 'effort' in interfaces)
-    mechanism = default(name)
+    mechanism = MECHANISMS[name.removesuffix('_clutches')]
     assert found['drive_controller'][1] == {'joints': [mechanism.inputs[0]]}
     assert found['output_controller'][1] == {'joints': list(mechanism.outputs)}
+
+
+@pytest.mark.parametrize('preset, name', [
+    ('open_axle', 'symmetric'), ('actuated_axle', 'symmetric_clutches'),
+    ('locker', 'symmetric_clutches'), ('plate_axle_2_way', 'symmetric_clutches'),
+    ('centre_40_60', 'lsd')])
+def test_each_mechanism_has_installed_controllers_for_the_clutches_that_it_has(preset, name):
+    _, mechanism, _ = described(read_parameter_file(PRESETS / f'{preset}.yaml'))
+    assert controllers_file(mechanism) == f'{name}_controllers.yaml'
+    assert (FOLDER / controllers_file(mechanism)).exists()
+
+
+def test_in_lockstep_the_installed_controllers_have_no_clutches_where_a_file_without_is_there():
+    _, mechanism, _ = described({'symmetric.clutch.left.friction_surfaces': 4})
+    assert controllers_file(mechanism, lockstep=True) == 'symmetric_controllers.yaml'
+
+
+@pytest.mark.parametrize('values, prefix, words', [
+    ({'port.left.kind': 'speed', 'port.right.kind': 'speed'}, '', r'with a speed port \(left, right\)'),
+    ({'variant': 'lsd_ode', 'port.rear.kind': 'speed'}, '', r'with a speed port \(rear\)'),
+    ({}, 'x_', 'with a joint_prefix it must be a file')])
+def test_where_no_installed_controllers_fit_it_says_to_give_a_file(values, prefix, words):
+    _, mechanism, _ = described(values)
+    with pytest.raises(ValueError, match=f'^ros2_control: {words}'):
+        controllers_file(mechanism, prefix)
 
 
 def test_names_and_topics_follow_prefix_and_node(printed):

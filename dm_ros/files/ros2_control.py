@@ -10,6 +10,24 @@ STATES = 'position', 'velocity', 'effort'   # all that a message has must be dec
 ALWAYS = '-1'   # threshold; by default a torque that is in force is not sent again: it grows stale
 
 
+def controllers_file(mechanism, prefix='', lockstep=False):
+    """
+    Return the name of the installed parameter file with controllers for a node.
+
+    :param mechanism: its equipped ``Mechanism`` with its ports; prefix: before names of joints.
+    :param lockstep: whether its description has no clutches, for each message is a tick.
+    :raises ValueError: says why none of them fits, and what to do.
+    """
+    if prefix:
+        raise ValueError('ros2_control: with a joint_prefix it must be a file with such joints')
+    if mechanism.half_shafts:   # once claimed, an effort is never NaN again: all is refused
+        raise ValueError(f'ros2_control: with a speed port ({", ".join(mechanism.half_shafts)}) '
+                         'it must be a file in which no controller claims the effort of its joint')
+    if mechanism.actuators and mechanism.name == 'symmetric' and not lockstep:
+        return 'symmetric_clutches_controllers.yaml'
+    return f'{mechanism.name}_controllers.yaml'
+
+
 def system(robot, name, joints, commands, **parameters):
     """Add a hardware component whose joints all have the same command interfaces."""
     component = SubElement(robot, 'ros2_control', name=name, type='system')

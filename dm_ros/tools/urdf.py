@@ -53,6 +53,19 @@ def node_name(words):
     return words
 
 
+def described(values):
+    """
+    Return the ``NodeParameters`` of a node, its ``Mechanism`` and the table of its parameters.
+
+    :param values: ``{full name: value}``, as ``read_parameter_file`` returns them.
+    :raises ValueError: names what is not allowed.
+    """
+    node = NodeParameters().changed(NodeParameters.part_of(values))
+    mechanism = mechanism_of(values, variant_named(node.variant).mechanism)
+    p = mechanism.parameters().changed(mechanism.parameters.part_of(values))
+    return node, equipped(mechanism, p, speed_ports(port_parameters(mechanism.inputs, values))), p
+
+
 def run(arguments):
     """Do what the command line says; raise ValueError or OSError where it cannot be done."""
     values = read_parameter_file(arguments.params) if arguments.params else {}
@@ -60,11 +73,8 @@ def run(arguments):
         values['variant'] = arguments.variant
     if arguments.joint_prefix is not None:
         values['joint_prefix'] = arguments.joint_prefix
-    node = NodeParameters().changed(NodeParameters.part_of(values))
-    mechanism = mechanism_of(values, variant_named(node.variant).mechanism)
+    node, mechanism, p = described(values)
     warn('urdf', arguments.params, values, mechanism)
-    p = mechanism.parameters().changed(mechanism.parameters.part_of(values))
-    mechanism = equipped(mechanism, p, speed_ports(port_parameters(mechanism.inputs, values)))
     text = urdf(mechanism, p, node.joint_prefix,
                 None if arguments.ros2_control is None else node_name(arguments.ros2_control),
                 node.mode == 'lockstep')

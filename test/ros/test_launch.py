@@ -154,7 +154,9 @@ def test_what_the_node_refuses_ends_it_with_code_1_and_the_reason(ros, desk, arg
     ('variant:=lsd_ode', '/differential/torques',
      'joint_state_broadcaster drive_controller output_controller clutch_controller'),
     ('namespace:=car params_file:=symmetric.yaml', '/car/differential/torques',
-     'joint_state_broadcaster drive_controller output_controller')])
+     'joint_state_broadcaster drive_controller output_controller'),
+    ('params_file:=config/presets/locker.yaml', '/differential/torques',
+     'joint_state_broadcaster drive_controller output_controller clutch_controller')])
 def test_ros2_control_has_the_description_of_the_node_and_its_controllers(
         ros, desk, manager, arguments, topic, controllers):
     with Started(f'ros2 launch dm_ros differential.launch.py ros2_control:=true {arguments}',
@@ -165,6 +167,15 @@ def test_ros2_control_has_the_description_of_the_node_and_its_controllers(
         ros.until(lambda: launch.ended() or 'finished cleanly' in launch.text)   # the spawner
         assert parameters(ros, topic.removesuffix('/torques'), 'rate') == [200.0]
         assert not launch.ended(), launch.text
+        launch.interrupt()
+        ros.until(launch.ended)
+        assert launch.returncode == 0, launch.text
+
+
+def test_what_is_false_does_not_start(ros, desk):
+    with Started('ros2 launch dm_ros differential.launch.py ros2_control:=false '
+                 'description:=false', desk) as launch:   # neither has its stand-ins
+        assert parameters(ros, '/differential', 'rate') == [200.0]
         launch.interrupt()
         ros.until(launch.ended)
         assert launch.returncode == 0, launch.text
@@ -186,10 +197,12 @@ def test_ros2_control_takes_other_controllers_by_a_file_also_of_a_pair(ros, desk
 @pytest.mark.parametrize('arguments, words', [
     ('ros2_control:=c.yaml', 'spawner'), ('ros2_control:=none.yaml', 'none.yaml'),
     ('ros2_control:=lsd.yaml', 'lsd.yaml: there is none of /controller_manager'),
-    ('ros2_control:=true joint_prefix:=x_', 'with a joint_prefix it must be a file')])
+    ('ros2_control:=true joint_prefix:=x_', 'with a joint_prefix it must be a file'),
+    ('ros2_control:=true params_file:=p.yaml', 'with a speed port (left) it must be a file')])
 def test_a_controller_that_cannot_be_started_ends_all(ros, desk, manager, arguments, words):
     (desk / 'c.yaml').write_text(
         'controller_manager: {ros__parameters: {update_rate: 50, nope: {type: x}}}')
+    (desk / 'p.yaml').write_text('/**: {ros__parameters: {port.left.kind: speed}}')
     with Started(f'ros2 launch dm_ros differential.launch.py {arguments}', desk) as launch:
         ros.until(launch.ended)
         assert launch.returncode == 1 and words in launch.text

@@ -217,7 +217,7 @@ def test_a_speed_port_takes_its_velocity_beside_the_efforts_of_others(ros, capsy
 
 
 @pytest.mark.parametrize('namespace', ['', '/car'])
-@pytest.mark.parametrize('name', VARIANTS)
+@pytest.mark.parametrize('name', [*VARIANTS, 'symmetric_clutches'])
 def test_ros_reads_the_controllers_file_for_manager_and_controllers(ros, name, namespace):
     file = FOLDER / f'{name}_controllers.yaml'
     for key, section in yaml.safe_load(file.read_text()).items():
