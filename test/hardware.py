@@ -9,9 +9,14 @@ node hears is what it would hear from the plugin. All values are NaN until someb
 """
 
 from math import isfinite, nan
+from pathlib import Path
+import re
 from xml.etree import ElementTree
 
+import yaml
+
 KINDS = 'position', 'velocity', 'effort'
+PAGE = Path(__file__).parents[1] / 'doc' / 'ros2_control.md'
 
 
 class Component:
@@ -60,22 +65,22 @@ class Component:
         return message
 
 
-class GroupEffortController:
-    """``effort_controllers/JointGroupEffortController``: keeps its last command for ever."""
+class GroupController:
+    """``JointGroupEffortController``, or ``...Velocity...``: keeps its last command for ever."""
 
-    def __init__(self, component, joints):
-        self._component, self._joints = component, joints
+    def __init__(self, component, joints, interface='effort'):
+        self._component, self._joints, self._interface = component, joints, interface
         self._command = None
 
-    def command(self, *efforts):
+    def command(self, *values):
         """Take what comes on ``~/commands``."""
-        self._command = efforts
+        self._command = values
 
     def update(self):
         """Write the command, once there was one, in each cycle."""
         if self._command:
-            for joint, effort in zip(self._joints, self._command, strict=True):
-                self._component.commands[joint, 'effort'] = effort
+            for joint, value in zip(self._joints, self._command, strict=True):
+                self._component.commands[joint, self._interface] = value
 
     def deactivate(self):
         """Leave zeros behind."""
@@ -88,3 +93,23 @@ def components(description):
     """Return the ``Component`` s of a URDF, by the ends of their names."""
     found = map(Component, ElementTree.fromstring(description).findall('ros2_control'))
     return {component.name.rpartition('differential')[2]: component for component in found}
+
+
+def controllers_on_the_page(words):
+    """Return the text of the parameter file with controllers on the page that has some words."""
+    found, = (block for block in re.findall(r'(?:^ {4,}\S.*\n)+', PAGE.read_text(), re.MULTILINE)
+              if 'controller_manager:' in block and words in block)
+    indent = re.match(' +', found).group()
+    return ''.join(line.removeprefix(indent) for line in found.splitlines(keepends=True))
+
+
+def claimed(text, namespace=''):
+    """Return ``[(joint, interface)]`` that the controllers of a parameter file claim."""
+    sections = yaml.safe_load(text)
+
+    def parameters(node):
+        return next(sections[key]['ros__parameters']
+                    for key in (f'{namespace}/{node}', f'/**/{node}') if key in sections)
+    return [(joint, kind[1].lower()) for name, value in parameters('controller_manager').items()
+            if isinstance(value, dict) and (kind := re.search('Group(.*)C', value['type']))
+            for joint in parameters(name)['joints']]

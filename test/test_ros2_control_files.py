@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 from xml.etree import ElementTree
 
-from hardware import components, KINDS
+from hardware import claimed, components, controllers_on_the_page, KINDS
 import pytest
 import yaml
 
@@ -127,7 +127,8 @@ def test_in_lockstep_the_installed_controllers_have_no_clutches_where_a_file_wit
 
 
 @pytest.mark.parametrize('values, prefix, words', [
-    ({'port.left.kind': 'speed', 'port.right.kind': 'speed'}, '', r'with a speed port \(left, right\)'),
+    ({'port.left.kind': 'speed', 'port.right.kind': 'speed'}, '',
+     r'with a speed port \(left, right\)'),
     ({'variant': 'lsd_ode', 'port.rear.kind': 'speed'}, '', r'with a speed port \(rear\)'),
     ({}, 'x_', 'with a joint_prefix it must be a file')])
 def test_where_no_installed_controllers_fit_it_says_to_give_a_file(values, prefix, words):
@@ -160,6 +161,20 @@ def test_with_a_speed_port_each_shaft_has_both_commands_and_a_clutch_its_force(p
     found = components(printed('variant: lsd_ode, port.front.kind: speed', '--ros2-control'))
     for end, interfaces in (('', ('effort', 'velocity')), ('_clutches', ('effort',))):
         assert set(map(tuple, found[end].commanded.values())) == {interfaces}
+
+
+def test_the_controllers_on_the_page_claim_of_each_shaft_what_its_port_takes(printed):
+    wanted = claimed(controllers_on_the_page('wheel_controller'))
+    assert sorted(wanted) == [('left', 'velocity'), ('pinion', 'effort'), ('right', 'velocity')]
+    found = components(printed('port.left.kind: speed, port.right.kind: speed', '--ros2-control'))
+    assert set(wanted) < set(found[''].commands)
+
+
+@pytest.mark.parametrize('axle', ['front', 'rear'])
+def test_the_controllers_on_the_page_for_a_pair_have_the_joints_of_each_axle(axle, printed):
+    joint, = claimed(controllers_on_the_page('front_pinion'), f'/{axle}')
+    description = printed(f'joint_prefix: {axle}_', '--ros2-control', f'/{axle}/differential')
+    assert joint in components(description)[''].commands
 
 
 def test_without_the_option_there_is_nothing_of_it(printed):

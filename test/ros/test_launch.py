@@ -9,6 +9,7 @@ import shlex
 import sys
 
 from command_line import has, Started
+from hardware import controllers_on_the_page
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters
@@ -192,6 +193,17 @@ def test_ros2_control_takes_other_controllers_by_a_file_also_of_a_pair(ros, desk
                       'asked for rear_torques --param-file c.yaml'):
             ros.until(lambda words=words: launch.ended() or words in launch.text)
             assert not launch.ended(), launch.text
+
+
+def test_the_controllers_on_the_page_for_a_pair_are_started_in_both(ros, desk, manager):
+    (desk / 'c.yaml').write_text(controllers_on_the_page('front_pinion'))
+    with Started('ros2 launch dm_ros axle_pair.launch.py ros2_control:=c.yaml', desk) as launch:
+        ros.until(lambda: launch.ended() or launch.text.count(
+            'asked for joint_state_broadcaster drive_controller --param-file c.yaml') == 2)
+        for axle in ('front', 'rear'):
+            ros.until(lambda axle=axle: launch.ended()
+                      or f'heard /{axle}/differential/torques at 200 Hz' in launch.text)
+        assert not launch.ended(), launch.text
 
 
 @pytest.mark.parametrize('arguments, words', [

@@ -7,11 +7,13 @@ from math import isnan
 from pathlib import Path
 from xml.etree import ElementTree
 
-from hardware import components, GroupEffortController
+from builtin_interfaces.msg import Time
+from hardware import claimed, components, controllers_on_the_page, GroupController
 import pytest
 import rclpy
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 import yaml
 
 from dm_ros.tools.urdf import main
@@ -46,10 +48,11 @@ class Manager:
         self.controllers = []
         self.sent = 0
 
-    def controller(self, end='', joints=None):
+    def controller(self, end='', joints=None, interface='effort'):
         """Return an active controller of some joints of a component, by the end of its name."""
         component = self.components[end]
-        self.controllers.append(GroupEffortController(component, joints or component.commanded))
+        self.controllers.append(
+            GroupController(component, joints or component.commanded, interface))
         return self.controllers[-1]
 
     def cycle(self):
@@ -103,12 +106,19 @@ def test_a_constant_torque_holds_in_every_tick(ros, steady, name):
 def test_by_the_default_threshold_of_the_plugin_a_constant_torque_pulses(ros, steady):
     node = ros.differential(**BRIEF)
     manager = Manager(ros, description('symmetric', '1e-5'))
-    manager.controller().command(*EFFORT['symmetric'])
+    others = manager.controller(joints=['left', 'right'])
+    manager.controller(joints=['pinion']).command(EFFORT['symmetric'][0])
+    for _ in range(100):   # 20 ticks would be stale
+        assert manager.cycle()   # whatever is in force, while a command is NaN
+        steady.tick(node, manager.joint_states)
+    sent, ticks = manager.sent, len(manager.efforts())
+    assert not drops(manager.efforts(), (EFFORT['symmetric'][0], 0.0, 0.0))
+    others.command(*EFFORT['symmetric'][1:])
     while drops(manager.efforts(), EFFORT['symmetric']) < 3:
         manager.cycle()
         steady.tick(node, manager.joint_states)
         assert len(manager.efforts()) < 2000
-    assert manager.sent < len(manager.efforts()) / 2
+    assert manager.sent - sent < (len(manager.efforts()) - ticks) / 2
 
 
 @pytest.mark.parametrize('name', VARIANTS)
@@ -137,6 +147,30 @@ def test_in_lockstep_by_the_default_threshold_time_stands_still(ros):
     ros.until(lambda: manager.joint_states)
     assert [manager.cycle() for _ in range(100)] == [False] * 100
     assert node.simulation.ticks == 1
+
+
+def test_in_lockstep_a_run_begins_at_0_by_a_reset_when_all_is_active(ros):
+    node = ros.differential(mode='lockstep')
+    manager = Manager(ros, description('symmetric'))
+
+    def cycle():
+        before = len(manager.joint_states)
+        assert manager.cycle()
+        ros.until(lambda: len(manager.joint_states) > before)
+        return manager.joint_states[-1]
+    for _ in range(5):
+        assert cycle().header.stamp.nanosec
+    assert node.simulation.ticks == 5   # before any controller is active
+    controller = manager.controller()
+    controller.command(1.0, 2.0, 3.0)
+    cycle()
+    controller.command(*EFFORT['symmetric'])
+    assert ros.call(Trigger, '/differential/reset').success
+    ros.until(lambda: manager.joint_states[-1].header.stamp == Time())
+    assert manager.efforts()[-1] == (0.0, 0.0, 0.0) and not any(manager.joint_states[-1].velocity)
+    first = cycle()
+    assert (first.header.stamp.sec, first.header.stamp.nanosec) == (0, 5_000_000)   # of 200 Hz
+    assert node.simulation.ticks == 1 and manager.efforts()[-1] == EFFORT['symmetric']
 
 
 def test_an_inactive_controller_commands_nothing_and_an_ended_one_zero(ros):
@@ -203,17 +237,61 @@ def test_a_joint_without_a_command_among_the_others_is_refused_with_what_to_decl
     assert '\n' not in reason and node.simulation.ticks == 0
 
 
-def test_a_speed_port_takes_its_velocity_beside_the_efforts_of_others(ros, capsys, tmp_path):
-    (tmp_path / 'p.yaml').write_text(
-        '/**: {ros__parameters: {port.left.kind: speed, mode: lockstep}}')
+@pytest.fixture
+def wheels(ros, capsys, tmp_path):
+    """Return a node with speed ports as on the page, a manager for it, and what cycles."""
+    (tmp_path / 'p.yaml').write_text('/**: {ros__parameters: {port.left.kind: speed, '
+                                     'port.right.kind: speed, mode: lockstep}}')
     assert main(['--params', str(tmp_path / 'p.yaml'), '--ros2-control']) == 0
-    node = ros.differential(mode='lockstep', port__left__kind='speed')
+    node = ros.differential(mode='lockstep', port__left__kind='speed', port__right__kind='speed')
     manager = Manager(ros, capsys.readouterr().out)
-    manager.shafts.commands['left', 'velocity'] = 2.0
-    manager.controller(joints=['pinion', 'right']).command(3.0, -4.0)
-    assert manager.cycle()
-    ros.until(lambda: manager.joint_states)
-    assert node.simulation.state.held == (3.0, 2.0, -4.0) and not node.plant.inputs.refused
+
+    def held():
+        before = len(manager.joint_states)
+        assert manager.cycle()
+        ros.until(lambda: len(manager.joint_states) > before)
+        return node.simulation.state.held
+    return node, manager, held
+
+
+def test_the_controllers_on_the_page_for_speed_ports_lock_a_wheel_where_they_end(wheels):
+    node, manager, held = wheels
+    joints = {}
+    for joint, interface in claimed(controllers_on_the_page('wheel_controller')):
+        joints.setdefault(interface, []).append(joint)
+    assert held() == (0.0, None, None)   # free before the first command
+    manager.controller(joints=joints['effort']).command(3.0)
+    wheel = manager.controller(joints=joints['velocity'], interface='velocity')
+    wheel.command(2.0, -4.0)
+    assert held() == (3.0, 2.0, -4.0)
+    wheel.deactivate()
+    assert held() == (3.0, 0.0, 0.0) and not node.plant.inputs.refused
+
+
+def test_an_effort_once_claimed_of_a_speed_port_has_every_message_refused(ros, wheels):
+    node, manager, held = wheels
+    manager.controller(joints=['pinion']).command(3.0)
+    wrong = manager.controller(joints=['left'])
+    assert held() == (3.0, None, None)   # active, without a command yet
+    wrong.deactivate()
+    manager.cycle()
+    ros.until(lambda: node.plant.inputs.refused)
+    assert node.plant.refusing.reason.endswith('left takes a speed, its effort must be NaN')
+    assert node.simulation.ticks == 1
+
+
+def test_beside_a_speed_port_clutches_are_commanded_by_force_alone(ros, steady, capsys, tmp_path):
+    (tmp_path / 'p.yaml').write_text(
+        '/**: {ros__parameters: {variant: lsd_ode, port.rear.kind: speed}}')
+    assert main(['--params', str(tmp_path / 'p.yaml'), '--ros2-control']) == 0
+    node = ros.differential('lsd_ode', port__rear__kind='speed', **BRIEF)
+    manager = Manager(ros, capsys.readouterr().out)
+    manager.controller(joints=['rear'], interface='velocity').command(2.0)
+    manager.controller('_clutches').command(300.0, 0.0)
+    while manager.components['_clutches'].states['front_clutch', 'effort'] != 300.0:
+        manager.cycle()
+        steady.tick(node, manager.joint_states)
+    assert not node.plant.inputs.refused
 
 
 @pytest.mark.parametrize('namespace', ['', '/car'])
