@@ -6,13 +6,17 @@
 import argparse
 import json
 from pathlib import Path
+import sys
 from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from dm_ros.ending import run_command
 from dm_ros.files.published import FRAME, Published
-from dm_ros.mechanism.variants import equipped, MECHANISMS
+from dm_ros.mechanism.variants import MECHANISMS, SYMMETRIC, WITH_CLUTCHES
+from dm_ros.tools.urdf import node_name
 
+SHOWN = {**MECHANISMS, 'symmetric_clutches': WITH_CLUTCHES[SYMMETRIC.name]}   # by names of files
 FOLDER = Path(__file__).parents[1] / 'config' / 'layouts'
 STREAMER = 'ROS2 Topic Subscriber'   # the name of a plugin of PlotJuggler
 # as they are drawn by the URDF: carrier, both outputs and their meshes, the others
@@ -177,24 +181,30 @@ def foxglove(mechanism, node, prefix):
 def layouts(node='/differential', prefix=''):
     """Return ``{name of a file: its text}`` for a node of that full name."""
     result = {}
-    for name, mechanism in MECHANISMS.items():
-        mechanism = equipped(mechanism, mechanism.parameters())
+    for name, mechanism in SHOWN.items():
         result[f'plotjuggler_{name}.xml'] = plotjuggler(mechanism, node, prefix)
         result[f'foxglove_{name}.json'] = foxglove(mechanism, node, prefix)
     return result
 
 
-def main():
+def write(arguments):
+    """Write all layouts; raise ValueError or OSError where it cannot be done."""
+    texts = layouts(node_name(arguments.node, '--node'), arguments.joint_prefix)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        (arguments.out / name).write_text(text)
+
+
+def main(args=None):
+    """Run the script and return its exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--node', default='/differential',
                         help='its full name; default: %(default)s')
     parser.add_argument('--joint-prefix', default='', help='as the node has it; default: none')
     parser.add_argument('--out', type=Path, default=FOLDER, help='folder; default: %(default)s')
-    arguments = parser.parse_args()
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    for name, text in layouts(arguments.node, arguments.joint_prefix).items():
-        (arguments.out / name).write_text(text)
+    arguments = parser.parse_args(args)
+    return run_command('layouts', lambda: write(arguments))
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

@@ -13,10 +13,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'examples'))
 
-from layouts import charts, layouts
+from layouts import charts, layouts, main, SHOWN
 
 from dm_ros.files.published import FRAME
-from dm_ros.mechanism.variants import equipped, MECHANISMS
 
 FOLDER = Path(__file__).parents[1] / 'config' / 'layouts'
 # what the loaders know, and what a panel must be given
@@ -27,13 +26,12 @@ PANELS = {
     'DiagnosticSummary': {'minLevel', 'pinnedIds', 'hardwareIdFilter', 'topicToRender'},
     'DiagnosticStatusPanel': {'topicToRender', 'selectedHardwareId', 'selectedName'}}
 COLOUR = re.compile('#[0-9a-f]{6}')
-each_mechanism = pytest.mark.parametrize('name', MECHANISMS)
+each_mechanism = pytest.mark.parametrize('name', SHOWN)
 
 
 def curves(name):
     """Return all curves that a layout should show."""
-    mechanism = equipped(MECHANISMS[name], MECHANISMS[name].parameters())
-    return [curve for chart in charts(mechanism) for curve in chart.curves]
+    return [curve for chart in charts(SHOWN[name]) for curve in chart.curves]
 
 
 def foxglove(name):
@@ -53,6 +51,22 @@ def test_node_and_prefix_are_in_all_names():
         assert ('/rear_' if name.endswith('xml') else f'rear_{FRAME}') in text
         if name.endswith('json'):
             assert '"/rear/robot_description"' in text
+
+
+@pytest.mark.parametrize('words', ['differential', '/a/', ''])
+def test_a_node_without_a_full_name_is_refused_in_one_line(words, tmp_path, capsys):
+    assert main(['--node', words, '--out', str(tmp_path / 'out')]) == 2
+    out, err = capsys.readouterr()
+    assert not out and err.count('\n') == 1 and not (tmp_path / 'out').exists()
+    assert err.startswith(f'layouts: error: --node: {words!r} is not the full name of a node')
+    assert main(['--node', '/a/b', '--out', str(tmp_path / 'out')]) == 0
+    assert '/a/b/' in (tmp_path / 'out' / 'plotjuggler_lsd.xml').read_text()
+
+
+def test_there_is_a_layout_for_a_symmetric_axle_with_and_without_clutches():
+    assert not any(curve.topic == 'clutches' for curve in curves('symmetric'))
+    assert {curve.name for curve in curves('symmetric_clutches') if curve.topic == 'clutches'} == {
+        'left_clutch', 'right_clutch'}
 
 
 @each_mechanism

@@ -45,10 +45,10 @@ def parser():
     return result
 
 
-def node_name(words):
-    """Return the full name of a node; raise ValueError where it is none."""
+def node_name(words, option):
+    """Return the full name of a node; raise ValueError where an option has none."""
     if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', words):
-        raise ValueError(f'--ros2-control: {words!r} is not the full name of a node, '
+        raise ValueError(f'{option}: {words!r} is not the full name of a node, '
                          'such as /rear/differential')
     return words
 
@@ -75,9 +75,9 @@ def run(arguments):
         values['joint_prefix'] = arguments.joint_prefix
     node, mechanism, p = described(values)
     warn('urdf', arguments.params, values, mechanism)
-    text = urdf(mechanism, p, node.joint_prefix,
-                None if arguments.ros2_control is None else node_name(arguments.ros2_control),
-                node.mode == 'lockstep')
+    controlled = (None if arguments.ros2_control is None
+                  else node_name(arguments.ros2_control, '--ros2-control'))
+    text = urdf(mechanism, p, node.joint_prefix, controlled, node.mode == 'lockstep')
     if arguments.out:
         with replacing(arguments.out, 'w') as file:
             file.write(text)
