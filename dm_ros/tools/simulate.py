@@ -173,7 +173,7 @@ def kept(rows, numbers):
 
 
 def loaded(arguments, variant, values):
-    """Return a simulation, the table of its torques, its ``Comparison`` with a recording or None."""
+    """Return a simulation, its ``TorqueTable``, and its ``Comparison`` or None."""
     is_auto = arguments.dt == 'auto'
     simulation = make_simulation(variant, values, None if is_auto else arguments.dt)
     mechanism = simulation.mechanism
