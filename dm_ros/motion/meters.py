@@ -17,11 +17,18 @@ from operator import add, mul
 
 import numpy as np
 
-from dm_ros.mechanism import losses, passive, self_locking, symmetric
+from dm_ros.mechanism import losses, passive, symmetric
 from dm_ros.mechanism.clutched import evaluate
+from dm_ros.mechanism.kinetic import (
+    energy_gained,
+    kinetic_energy,
+    self_locking_form,
+    symmetric_form,
+)
 from dm_ros.mechanism.symmetric import TO_SLIP
 from dm_ros.motion.exponentials import way
 from dm_ros.motion.models import (
+    Booked,
     ClutchedModel,
     ClutchedSymmetricModel,
     PassiveModel,
@@ -30,41 +37,6 @@ from dm_ros.motion.models import (
 )
 from dm_ros.motion.patterns import Pattern
 from dm_ros.motion.quadrature import rule_for, second_moment_of_the_way
-
-
-def kinetic_form(inertias, shafts):
-    """Return (m_11, m_12, m_22): kinetic energy is (m_11 x_1^2 + m_22 x_2^2)/2 + m_12 x_1 x_2."""
-    m = shafts.T @ (np.array(inertias)[:, None] * shafts)
-    return float(m[0, 0]), float(m[0, 1]), float(m[1, 1])
-
-
-def symmetric_form(p):
-    """Return the form of the kinetic energy of a symmetric differential in (w, s)."""
-    return kinetic_form((p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s),
-                        symmetric.kinematics(p) @ np.linalg.inv(TO_SLIP))
-
-
-def self_locking_form(p):
-    """Return the form of the kinetic energy of a self-locking differential in (w, s)."""
-    return kinetic_form(
-        (p.I_0, p.I_1, p.I_2, p.n_s * p.I_s),
-        self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p)))
-
-
-def kinetic_energy(m, x):
-    """Return the kinetic energy at the speeds x, J."""
-    m_11, m_12, m_22 = m
-    x_1, x_2 = x
-    return (m_11 * x_1 * x_1 + m_22 * x_2 * x_2) / 2 + m_12 * x_1 * x_2
-
-
-def energy_gained(m, start, end):
-    """Return the difference of the kinetic energies, J, exact also where it is small."""
-    m_11, m_12, m_22 = m
-    (x_1, x_2), (y_1, y_2) = start, end
-    s_1, s_2 = y_1 + x_1, y_2 + x_2
-    return ((y_1 - x_1) * (m_11 * s_1 + m_12 * s_2)
-            + (y_2 - x_2) * (m_12 * s_1 + m_22 * s_2)) / 2
 
 
 def leads_far(w, s, d_w, d_s):
@@ -301,9 +273,8 @@ class PassiveMeter:
     """
 
     def __init__(self, model):
-        p, self._h = model.parameters, model.h
-        self._k, self._clutches = model.k, model.clutches
-        self.form = symmetric_form(p) if model.k.g_F else self_locking_form(p)
+        self._h, self._k, self._clutches = model.h, model.k, model.clutches
+        self.form = model.form
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
@@ -316,16 +287,17 @@ class PassiveMeter:
         if type(path) is Pattern:
             return linear_book(path.second, path.moments, path.losses, self.form, k.g_F, self._h,
                                x, end, integral, T)
-        u, parts = path
-        lost = numerical = None
-        for part in parts:
-            more, taken = self._part(u, part)
-            if lost is None:
-                lost, numerical = more, taken
-            else:
-                lost, numerical = tuple(map(add, lost, more)), numerical + taken
+        lost, numerical = path if type(path) is Booked else self._booked(*path)
         work = map(mul, T, self.angles(integral))
         return *work, energy_gained(self.form, x, end), *self._of_elements(lost), numerical
+
+    def _booked(self, u, parts):
+        first, *others = parts
+        lost, numerical = self._part(u, first)
+        for part in others:
+            more, taken = self._part(u, part)
+            lost, numerical = tuple(map(add, lost, more)), numerical + taken
+        return Booked(lost, numerical)
 
     def angles(self, integral):
         """Return the angles of the shafts with a port from the integral of x, rad."""

@@ -14,13 +14,17 @@ what it did, a tuple::
 
 from the speeds at the start to those at the end, with their integral over the step. ``point`` is
 what is known at the end and saves finding it again for the moments, or None; ``path`` tells the
-way between: the ``Pattern`` of an exact step, ``(u, parts)`` of ``adaptive.step``, or None where
-the flow tells it.
+way between: the ``Pattern`` of an exact step, ``(u, parts)`` of ``adaptive.step``, what was
+``Booked`` along it in C, or None where the flow tells it.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
+from dm_ros import core
 from dm_ros.mechanism import clutched, passive, symmetric
+from dm_ros.mechanism.kinetic import self_locking_form, symmetric_form
 from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.motion import adaptive, held_torque
@@ -53,6 +57,7 @@ class SymmetricModel:
 
     lagged = False
     half_shafts = ()
+    language = 'Python'   # of its steps
 
     def __init__(self, formulation, parameters, h):
         self.parameters, self.h = parameters, h
@@ -102,6 +107,7 @@ class ClutchedModel:
     """A self-locking differential under the paper's law; x is (omega_0, omega_1 - omega_2)."""
 
     half_shafts = ()
+    language = 'Python'   # of its steps
 
     def __init__(self, formulation, parameters, h):
         self.parameters, self.h = parameters, h
@@ -199,6 +205,13 @@ class ClutchedSymmetricModel(ClutchedModel):
         return direction * M_F, *super().internal_moments(x, T, direction, point)
 
 
+class Booked(NamedTuple):
+    """What the elements lost along the path of a step, and what its error took, J."""
+
+    lost: tuple        # in the order of ``passive.lost_powers``
+    numerical: float
+
+
 class PassiveModel:
     """A differential under the passive law; x is (omega_0, omega_1 - omega_2)."""
 
@@ -214,7 +227,10 @@ class PassiveModel:
         self._phi, self._preload = (clutched.full_friction(parameters) if clutches
                                     else ((0.0, 0.0), (0.0, 0.0)))
         self._g_2s = parameters.g_2s
+        self.form = (symmetric_form if self.k.g_F else self_locking_form)(parameters)
         self.tolerance = adaptive.TOLERANCE / 5   # signs that turn round make kinks
+        self._core_step, self._packed = core.passive_step, core.packed(self.k)
+        self.language = core.language if self._core_step else 'Python'
 
     def coefficients_of(self, flow):
         """Return the ``Coefficients``, see ``passive``; nothing depends on the flow."""
@@ -259,6 +275,10 @@ class PassiveModel:
         return clutched.pressing(self.parameters, M_1, M_2)
 
     def _adaptive_step(self, x, u, flow, here=None):
+        if self._core_step:
+            end, integral, point, coarse, books = self._core_step(
+                self._packed, u, x, self.h, self.tolerance, self.form)
+            return x, flow, end, integral, point, coarse, Booked(*books)
         end, integral, point, coarse, parts = adaptive.step(
             adaptive.PASSIVE, self.k, u, x, self.h, self.tolerance, here)
         return x, flow, end, integral, point, coarse, (u, parts)

@@ -1,0 +1,40 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The ticks in C, where they are built: ``language`` is what is in use, ``'C'`` or ``'Python'``.
+
+Both give the same bits; Python is the reference, and what is left where there was no compiler.
+The environment variable ``DM_ROS_CORE`` chooses, ``c`` or ``python``; without it C is taken where
+it is built. In C is the adaptive step under the passive law with its books, on torques.
+"""
+
+import dataclasses
+from importlib import import_module
+import os
+import struct
+
+CHOICE = 'DM_ROS_CORE'
+
+
+def _chosen(choice):
+    if choice not in ('', 'c', 'python'):
+        raise ImportError(f'{CHOICE}: {choice!r} is not one of c, python')
+    if choice != 'python':
+        try:
+            return import_module('dm_ros._core')
+        except ImportError as error:
+            if choice == 'c':
+                raise ImportError(f'{CHOICE}: c is not built here: {error}') from None
+    return None
+
+
+_module = _chosen(os.environ.get(CHOICE, ''))
+language = 'C' if _module else 'Python'
+passive_step = _module.passive_step if _module else None
+
+
+def packed(coefficients):
+    """Return the numbers of a dataclass of floats as C has them."""
+    values = dataclasses.astuple(coefficients)
+    return struct.pack(f'{len(values)}d', *values)
