@@ -126,4 +126,4 @@ test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's n
 
 clean:  ## remove all that the other targets make
 	rm -rf .venv .venv-* build install log run comparison docs_build docs_output cross_reference \
-	  dm_ros/_core.* *.egg-info .hypothesis .pytest_cache .ruff_cache
+	  dm_ros/_core.abi3.so *.egg-info .hypothesis .pytest_cache .ruff_cache

@@ -7,7 +7,7 @@
 #ifndef DM_ROS_EXPONENTIALS_H
 #define DM_ROS_EXPONENTIALS_H
 
-#include "passive_equations.h"
+#include "core.h"
 
 /* Return the vector phi_2(Z) v. */
 pair dm_apply_phi_2(step *job, double z_11, double z_12, double z_21, double z_22, double v_1,

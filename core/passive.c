@@ -6,26 +6,17 @@
 
 #include <math.h>
 
-#include "passive_equations.h"
+#include "passive.h"
 
-static const double ROUNDS = 8;
 static const double STRAIGHT = 0.02;
-
-double dm_quotient(step *job, double a, double b)
-{
-    if (b == 0.0) {
-        job->broken = 1;
-        return NAN;
-    }
-    return a / b;
-}
+enum { ROUNDS = 8, NEWTON = 30 };
 
 /* Solve the equations at given signs; return by how much the solution disagrees with them. */
 static double solve(step *job, double q_1, double q_2, const double *state, signs sign,
                     signs *found, point *result)
 {
-    const coefficients *k = job->k;
-    const double T_in = job->u.T_in, S_1 = job->u.S_1, S_2 = job->u.S_2;
+    const coefficients *k = job->coefficients;
+    const double T_in = job->u[T_IN], S_1 = job->u[S_ONE], S_2 = job->u[S_TWO];
     const double w = state[0], s = state[1], sigma_0 = state[2], sigma_1 = state[3];
     const double sigma_2 = state[4], t_1 = state[5], t_2 = state[6];
     const double s_1 = sign.s_1, s_2 = sign.s_2, s_F = sign.s_F, h_N = sign.h_N, b = sign.b;
@@ -111,17 +102,17 @@ static double solve(step *job, double q_1, double q_2, const double *state, sign
     return wrong;
 }
 
-point dm_evaluate(step *job, double w, double s)
+static point evaluate(step *job, double w, double s)
 {
-    const coefficients *k = job->k;
-    const held *u = &job->u;
+    const coefficients *k = job->coefficients;
+    const double *u = job->u;
     const double k_1s = k->k_1 * s, k_2s = k->k_2 * s;
     const double t_1 = tanh(k->a_1 * s), t_2 = tanh(k->a_2 * s);
     const double state[STATE] = {
         w, s, tanh(dm_quotient(job, w, k->sign_speed)), tanh(dm_quotient(job, w + k_1s, k->sign_speed)),
         tanh(dm_quotient(job, w - k_2s, k->sign_speed)), t_1, t_2};
-    const double q_1 = u->S_1 * t_1 + k->l_1 * k_1s - u->T_1;
-    const double q_2 = u->S_2 * t_2 - k->l_2 * k_2s - u->T_2;
+    const double q_1 = u[S_ONE] * t_1 + k->l_1 * k_1s - u[T_ONE];
+    const double q_2 = u[S_TWO] * t_2 - k->l_2 * k_2s - u[T_TWO];
     const double both = q_1 + q_2;
     signs sign = {q_1 >= 0.0 ? 1.0 : -1.0, q_2 >= 0.0 ? 1.0 : -1.0, both >= 0.0 ? 1.0 : -1.0,
                   both * w > 0.0 ? 1.0 : 0.0, 1.0}, found;
@@ -144,10 +135,10 @@ point dm_evaluate(step *job, double w, double s)
     return best;
 }
 
-matrix dm_jacobian(step *job, const point *at)
+static slopes jacobian(step *job, const point *at)
 {
-    const coefficients *k = job->k;
-    const double T_in = job->u.T_in, S_1 = job->u.S_1, S_2 = job->u.S_2;
+    const coefficients *k = job->coefficients;
+    const double T_in = job->u[T_IN], S_1 = job->u[S_ONE], S_2 = job->u[S_TWO];
     const double M_1 = at->M_1, M_2 = at->M_2, M_F = at->M_F;
     const double s_1 = at->sign.s_1, s_2 = at->sign.s_2, s_F = at->sign.s_F;
     const double h_N = at->sign.h_N, b = at->sign.b;
@@ -199,14 +190,15 @@ matrix dm_jacobian(step *job, const point *at)
     }
     const double r_w = k->g_12 * (n_1w * M_1 + n_1 * M_1w) - n_2w * M_2 - n_2 * M_2w;
     const double r_s = k->g_12 * (n_1s * M_1 + n_1 * M_1s) - n_2s * M_2 - n_2 * M_2s + k->l_s;
-    return (matrix){
-        dm_quotient(job, G_12 * r_w - G_22 * g_w, det), dm_quotient(job, G_12 * r_s - G_22 * g_s, det),
-        dm_quotient(job, G_21 * g_w - G_11 * r_w, det), dm_quotient(job, G_21 * g_s - G_11 * r_s, det)};
+    return (slopes){{dm_quotient(job, G_12 * r_w - G_22 * g_w, det),
+                     dm_quotient(job, G_12 * r_s - G_22 * g_s, det),
+                     dm_quotient(job, G_21 * g_w - G_11 * r_w, det),
+                     dm_quotient(job, G_21 * g_s - G_11 * r_s, det)}, {0.0}};
 }
 
-int dm_bends(const step *job, const point *here, const point *there)
+static int bends(const step *job, const point *here, const point *there)
 {
-    const coefficients *k = job->k;
+    const coefficients *k = job->coefficients;
     const signs *a = &here->sign, *b = &there->sign;
     if (a->s_1 != b->s_1 || a->s_2 != b->s_2 || a->s_F != b->s_F || a->h_N != b->h_N
         || a->b != b->b)
@@ -224,8 +216,8 @@ int dm_bends(const step *job, const point *here, const point *there)
 
 void dm_lost_powers(const step *job, const point *at, double *lost)
 {
-    const coefficients *k = job->k;
-    const double T_in = job->u.T_in, F_1 = at->F_1, F_2 = at->F_2;
+    const coefficients *k = job->coefficients;
+    const double T_in = job->u[T_IN], F_1 = at->F_1, F_2 = at->F_2;
     const double M_1 = at->M_1, M_2 = at->M_2, M_F = at->M_F;
     const double h_N = at->sign.h_N, b = at->sign.b;
     const double w = at->state[0], s = at->state[1], sigma_0 = at->state[2];
@@ -256,3 +248,81 @@ void dm_lost_powers(const step *job, const point *at, double *lost)
     lost[6] = F_1 * k_1s;
     lost[7] = -F_2 * k_2s;
 }
+
+static double carrier_residual(const context *f, double w)
+{
+    return w - f->w_0 - f->h * evaluate(f->job, w, f->slip).e_0;
+}
+
+/* Return the carrier speed that fits a slip, NaN where none does, which no root survives. */
+static double carrier(const context *f, double slip)
+{
+    context inner = *f;
+    double w;
+    inner.value = carrier_residual;
+    inner.slip = slip;
+    return dm_root(&inner, f->w_0, &w) ? w : NAN;
+}
+
+static double slip_residual(const context *f, double slip)
+{
+    return slip - f->s_0 - f->h * evaluate(f->job, carrier(f, slip), slip).e_s;
+}
+
+/* Return whether y_end = y + h f(y_end), but for what a root leaves where f is steep. */
+static int solved(step *job, pair y, pair end, double h)
+{
+    const double d_w = end.w - y.w, d_s = end.s - y.s;
+    const point at = evaluate(job, end.w, end.s);
+    return fabs(d_w - h * at.e_0) + fabs(d_s - h * at.e_s)
+        <= 1e-4 + 1e-6 * (fabs(d_w) + fabs(d_s));
+}
+
+static int newton(step *job, pair y, double h, pair *end)
+{
+    double w = y.w, s = y.s;
+    for (int n = 0; n < NEWTON; n++) {
+        const point at = evaluate(job, w, s);
+        const matrix J = jacobian(job, &at).J;
+        const double r_w = w - y.w - h * at.e_0, r_s = s - y.s - h * at.e_s;
+        const double a = 1 - h * J.ww, b = -h * J.ws, c = -h * J.sw, d = 1 - h * J.ss;
+        const double det = a * d - b * c;
+        const double d_w = dm_quotient(job, d * r_w - b * r_s, det);
+        const double d_s = dm_quotient(job, a * r_s - c * r_w, det);
+        if (job->broken)
+            return 0;
+        w = w - d_w;
+        s = s - d_s;
+        if (fabs(d_w) + fabs(d_s) <= 1e-12 * (fabs(w) + fabs(s)) + 1e-12) {
+            *end = (pair){w, s};
+            return solved(job, y, *end, h) && !job->broken;
+        }
+    }
+    return 0;
+}
+
+/* Put the end of a step that makes no energy into end; return 0 where none is found. */
+static int implicit_euler(step *job, pair y, matrix J, double h, pair *end, pair *integral)
+{
+    (void)J;
+    if (newton(job, y, h, end)) {
+        *integral = (pair){h * end->w, h * end->s};
+        return 1;
+    }
+    job->broken = 0;
+    context f = {job, slip_residual, y.w, y.s, h, 0.0};
+    double slip;
+    const int is_found = dm_root(&f, y.s, &slip);
+    const double w = is_found ? carrier(&f, slip) : NAN;
+    if (!is_found || isnan(w) || job->broken) {
+        job->broken = 0;
+        return 0;
+    }
+    *end = (pair){w, slip};
+    *integral = (pair){h * w, h * slip};
+    return solved(job, y, *end, h);
+}
+
+const law dm_passive = {
+    400, 1e-12, evaluate, jacobian, bends, implicit_euler, dm_passive_book,
+};

@@ -1,15 +1,13 @@
 /* Copyright 2026 dm_ros developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * The passive law of losses and its adaptive step, line by line as in Python:
- * dm_ros/mechanism/passive.py, dm_ros/motion/adaptive.py, exponentials.py, quadrature.py and
- * meters.py, where the equations and their reasons are told. Equal inputs give equal bits.
+ * The passive law of losses: see dm_ros/mechanism/passive.py.
  */
 
 #ifndef DM_ROS_PASSIVE_H
 #define DM_ROS_PASSIVE_H
 
-enum { STATE = 7, SOLVED = 17, LOST = 8 };
+#include "core.h"
 
 /* What does not change while the parameters stay, in the order of passive.Coefficients. */
 typedef struct {
@@ -19,48 +17,14 @@ typedef struct {
 } coefficients;
 
 /* What is held in a step, N m. */
-typedef struct {
-    double T_in, T_1, T_2, S_1, S_2;
-} held;
+enum { T_IN, T_ONE, T_TWO, S_ONE, S_TWO };
 
-typedef struct {
-    double w, s;
-} pair;
+extern const law dm_passive;
 
-typedef struct {
-    double ww, ws, sw, ss;
-} matrix;
+/* Put the power that each element takes into lost, W. */
+void dm_lost_powers(const step *job, const point *at, double *lost);
 
-typedef struct {
-    double s_1, s_2, s_F, h_N, b;
-} signs;
-
-/* All that is known of one state; signs, state and solved as in passive.py. */
-typedef struct {
-    double e_0, e_s, F_1, F_2, M_1, M_2, M_F;
-    signs sign;
-    double state[STATE];
-    double solved[SOLVED];
-} point;
-
-/* A step: what is asked for, and what comes out. */
-typedef struct {
-    const coefficients *k;
-    held u;
-    double h, tolerance;
-    double form[3];    /* of the kinetic energy: m_ww, m_ws, m_ss */
-    int has_books;
-    int broken;        /* a number divided by zero, which ends the step as it does in Python */
-    pair end, integral;
-    point at_end;
-    int coarse;
-    double lost[LOST], numerical;
-} step;
-
-/* Return the point at the carrier speed w and the slip s. */
-point dm_evaluate(step *job, double w, double s);
-
-/* Advance from y; return 0, or -1 where no speed in reach fits or a number divided by zero. */
-int dm_advance(step *job, pair y);
+/* Put what the elements lost in a part into lost, J, and what its error took into taken. */
+void dm_passive_book(step *job, const part *path, double *lost, double *taken);
 
 #endif

@@ -450,26 +450,28 @@ def endure(variant, kind, settle, periods, loss_law=PASSIVE):
 
 
 class Twins:
-    """Random cases under the passive law, by C and by Python: equal to the last bit."""
+    """Random cases by C and by Python: equal to the last bit."""
 
-    def __init__(self, clutched=False):
-        self.clutched = clutched
+    def __init__(self, loss_law, clutched=False):
+        self.loss_law, self.clutched = loss_law, clutched
         self.cases = self.ticks = self.coarse_steps = self.refused = 0
 
     def __str__(self):
         which = 'symmetric with clutches' if self.clutched else 'all variants'
-        return (f'{which}: {self.cases} cases, {self.ticks} ticks, {self.coarse_steps} coarse '
+        return (f'{self.loss_law}, {which}: {self.cases} cases, {self.ticks} ticks, '
+                f'{self.coarse_steps} coarse '
                 f'steps, {self.refused} ticks refused, equal bits')
 
     def run(self, n):
         """Run case n both ways; raise AssertionError, with the case, where they differ."""
         rng, case = np.random.default_rng([6, n]), random_case(n, self.clutched)
         p = dataclasses.replace(case.arguments['parameters'], sign_speed=power_of_ten(rng, -3, 2))
-        arguments = {**case.arguments, 'parameters': p, 'loss_law': PASSIVE}
+        arguments = {**case.arguments, 'parameters': p, 'loss_law': self.loss_law}
         forces = rng.uniform(0.0, 1e4, (len(case.load), 2)) * rng.integers(2)
         ways = []
-        for function in (core.passive_step, None):
-            with mock.patch.object(core, 'passive_step', function):
+        for functions in ({name: getattr(core, name) for name in core.STEPS},
+                          dict.fromkeys(core.STEPS)):
+            with mock.patch.multiple(core, **functions):
                 ways.append(self._way(case.variant, arguments, case.load, forces.tolist()))
         assert ways[0] == ways[1], f'case {n}: {case}'
         self.cases += 1

@@ -12,6 +12,7 @@ from properties import Twins
 import pytest
 
 from dm_ros import core
+from dm_ros.motion.models import LOSS_LAWS
 
 ROOT = Path(__file__).parents[1]
 built = pytest.mark.skipif(core._chosen('') is None, reason='the core in C is not built')
@@ -26,9 +27,11 @@ def python(*arguments, **environment):
 
 @built
 @pytest.mark.parametrize('clutched', [False, True])
-def test_c_and_python_give_the_same_bits_on_random_mechanisms(clutched, monkeypatch):
-    monkeypatch.setattr(core, 'passive_step', core._chosen('').passive_step)
-    twins = Twins(clutched)
+@pytest.mark.parametrize('loss_law', LOSS_LAWS)
+def test_c_and_python_give_the_same_bits_on_random_mechanisms(loss_law, clutched, monkeypatch):
+    for name in core.STEPS:
+        monkeypatch.setattr(core, name, getattr(core._chosen(''), name))
+    twins = Twins(loss_law, clutched)
     for n in range(150):
         twins.run(n)
     print(twins)
@@ -67,17 +70,24 @@ def test_a_build_without_a_compiler_ends_well(tmp_path):
 
 @built
 def test_numbers_that_are_none_are_refused():
-    step = core._chosen('').passive_step
-    good = bytes(8 * 29), (0.0,) * 5, (0.0, 0.0), 1e-3, 1e-4, None
-    for place, bad, words in (
-            (0, b'', '232 bytes'), (1, (0.0,), 'u must be a tuple of 5 numbers'),
-            (1, ('a',) * 5, 'must be real number'), (2, [0.0, 0.0], 'y must be a tuple of 2'),
-            (5, (1.0,), 'form must be a tuple of 3')):
+    passive = bytes(8 * 29), (0.0,) * 5, (0.0, 0.0), 1e-3, 1e-4, (0.0,) * 3
+    paper = (bytes(8 * 34), bytes(8 * 10), (0.0,) * 6, (0.0,) * 3, (0.0, 0.0), 1e-3, 1e-4,
+             (0.0,) * 3)
+    for name, good, place, bad, words in (
+            ('passive_step', passive, 0, b'', 'coefficients must be 232 bytes, not 0'),
+            ('passive_step', passive, 1, (0.0,), 'u must be a tuple of 5 numbers'),
+            ('passive_step', passive, 1, ('a',) * 5, 'must be real number'),
+            ('passive_step', passive, 2, [0.0, 0.0], 'y must be a tuple of 2'),
+            ('passive_step', passive, 5, (1.0,), 'form must be a tuple of 3'),
+            ('paper_step', paper, 0, b'', 'coefficients must be 272 bytes'),
+            ('paper_step', paper, 1, bytes(9), 'losses must be 184 bytes, not 9'),
+            ('paper_step', paper, 3, (1.0,), 'T must be a tuple of 3')):
         with pytest.raises(TypeError, match=words):
-            step(*good[:place], bad, *good[place + 1:])
+            getattr(core._chosen(''), name)(*good[:place], bad, *good[place + 1:])
 
 
 @built
 def test_what_divides_by_zero_is_an_error_as_in_python():
     with pytest.raises(ArithmeticError):
-        core._chosen('').passive_step(bytes(8 * 29), (0.0,) * 5, (1.0, 0.0), 1e-3, 1e-4, None)
+        core._chosen('').passive_step(bytes(8 * 29), (0.0,) * 5, (1.0, 0.0), 1e-3, 1e-4,
+                                      (0.0,) * 3)

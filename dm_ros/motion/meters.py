@@ -22,7 +22,6 @@ from dm_ros.mechanism.clutched import evaluate
 from dm_ros.mechanism.kinetic import (
     energy_gained,
     kinetic_energy,
-    self_locking_form,
     symmetric_form,
 )
 from dm_ros.mechanism.symmetric import TO_SLIP
@@ -120,12 +119,10 @@ class ClutchedMeter:
     CALM = 4e-6   # rad/s of c: with less, the remainder is some hundredth of the step's tolerance
 
     def __init__(self, model):
-        p = model.parameters
-        self.form = self_locking_form(p)
+        p, self.form, self._losses = model.parameters, model.form, model.losses
         self._k_1, self._k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
         self._input_ratio = 1.0   # of the input shaft to the carrier
         self._coefficients = model.coefficients
-        self._losses = {d: losses.self_locking_losses(p, d) for d in model.responses}
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
@@ -144,15 +141,18 @@ class ClutchedMeter:
 
     def book(self, step, T):
         """Return the energies of a step, see the module."""
-        x, direction, end, integral, _, _, (u, parts) = step
+        x, direction, end, integral, _, _, path = step
+        lost, numerical = path if type(path) is Booked else self._booked(direction, T, *path)
+        work = map(mul, T, self.angles(integral))
+        return *work, energy_gained(self.form, x, end), *lost, numerical
+
+    def _booked(self, direction, T, u, parts):
         first, *others = parts
         lost, numerical = self._part(direction, u, T, first)
         for part in others:
             more, taken = self._part(direction, u, T, part)
-            lost = tuple(map(add, lost, more))
-            numerical += taken
-        work = map(mul, T, self.angles(integral))
-        return *work, energy_gained(self.form, x, end), *lost, numerical
+            lost, numerical = tuple(map(add, lost, more)), numerical + taken
+        return Booked(lost, numerical)
 
     def _part(self, direction, u, T, part):
         """Return what the elements lost in a part of the path, and what its error took."""
@@ -249,10 +249,8 @@ class ClutchedSymmetricMeter(ClutchedMeter):
 
     def __init__(self, model):
         super().__init__(model)
-        p = model.parameters
-        self.form, self._input_ratio = symmetric_form(p), p.g_F
+        self._input_ratio = model.parameters.g_F
         self._final_drives = model.final_drives
-        self._losses = {d: losses.symmetric_losses(p, d) for d in model.responses}
 
     def _lost(self, direction, T, a_w, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, *meshes):
         k, (T_3, T_1, T_2) = self._final_drives[direction], T

@@ -18,12 +18,13 @@ way between: the ``Pattern`` of an exact step, ``(u, parts)`` of ``adaptive.step
 ``Booked`` along it in C, or None where the flow tells it.
 """
 
+import struct
 from typing import NamedTuple
 
 import numpy as np
 
 from dm_ros import core
-from dm_ros.mechanism import clutched, passive, symmetric
+from dm_ros.mechanism import clutched, losses, passive, symmetric
 from dm_ros.mechanism.kinetic import self_locking_form, symmetric_form
 from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
 from dm_ros.mechanism.variants import SYMMETRIC
@@ -50,6 +51,13 @@ def no_solution(parameters):
     """Return the error of parameters that are not fit for floating point numbers."""
     return ValueError(f'{parameters.prefix}: the equations of these parameters have no finite '
                       'solution, some are too large or too small beside the others')
+
+
+class Booked(NamedTuple):
+    """What the elements lost along the path of a step, and what its error took, J."""
+
+    lost: tuple        # in the order of ``passive.lost_powers``
+    numerical: float
 
 
 class SymmetricModel:
@@ -121,9 +129,24 @@ class ClutchedModel:
             direction: clutched.coefficients(
                 parameters, response, not self.lagged, direction)
             for direction, response in self.responses.items()}
+        self.losses, self.form = self._books()
+        self._core_step = core.paper_step
+        self.language = core.language if self._core_step else 'Python'
+        self._packed = {
+            direction: (core.packed(self.coefficients[direction]), self._packed_losses(direction))
+            for direction in self.responses}
 
     def _responses(self, formulation):
         return responses_of(formulation, self.parameters)
+
+    def _books(self):
+        """Return the coefficients of the losses by direction, and the form of the energy."""
+        p = self.parameters
+        return ({direction: losses.self_locking_losses(p, direction)
+                 for direction in self.responses}, self_locking_form(p))
+
+    def _packed_losses(self, direction):
+        return core.packed(self.losses[direction])
 
     def coefficients_of(self, direction):
         """Return the ``Coefficients`` of a direction of power flow, see ``clutched``."""
@@ -149,6 +172,10 @@ class ClutchedModel:
         """Advance by h; see the module for what is returned."""
         k = self.coefficients[direction]
         u = clutched.held(k, T, S)
+        if self._core_step:
+            end, integral, point, coarse, books = self._core_step(
+                *self._packed[direction], u, T, x, self.h, self.tolerance, self.form)
+            return x, direction, end, integral, point, coarse, Booked(*books)
         end, integral, point, coarse, parts = adaptive.step(
             adaptive.PAPER, k, u, x, self.h, self.tolerance)
         return x, direction, end, integral, point, coarse, (u, parts)
@@ -178,14 +205,24 @@ class ClutchedSymmetricModel(ClutchedModel):
     """A symmetric differential with clutches under the paper's law; x is as of the other."""
 
     def __init__(self, formulation, parameters, h):
-        super().__init__(formulation, parameters, h)
         self._g_F = parameters.g_F
-        self.final_drives = {direction: clutched.final_drive(response)
-                             for direction, response in self.responses.items()}
+        super().__init__(formulation, parameters, h)
 
     def _responses(self, formulation):
-        return {direction: symmetric.in_slip(response) for direction, response
-                in responses_of(formulation, self.parameters).items()}
+        responses = {direction: symmetric.in_slip(response) for direction, response
+                     in responses_of(formulation, self.parameters).items()}
+        self.final_drives = {direction: clutched.final_drive(response)
+                             for direction, response in responses.items()}
+        return responses
+
+    def _books(self):
+        p = self.parameters
+        return ({direction: losses.symmetric_losses(p, direction)
+                 for direction in self.responses}, symmetric_form(p))
+
+    def _packed_losses(self, direction):
+        return core.packed(self.losses[direction], self.final_drives[direction]) + (
+            struct.pack('d', self._g_F))
 
     def all_shafts(self, x):
         """Return the speeds of all shafts from x, or their angles from its integral, (5)-(7)."""
@@ -203,13 +240,6 @@ class ClutchedSymmetricModel(ClutchedModel):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
         M_F = clutched.final_drive_moment(self.final_drives[direction], x, T, point)
         return direction * M_F, *super().internal_moments(x, T, direction, point)
-
-
-class Booked(NamedTuple):
-    """What the elements lost along the path of a step, and what its error took, J."""
-
-    lost: tuple        # in the order of ``passive.lost_powers``
-    numerical: float
 
 
 class PassiveModel:
