@@ -115,6 +115,8 @@ colcon: .venv/colcon  ## build the package with colcon, check what it installs, 
 	PATH="$(CURDIR)/.venv/bin:$$PATH" colcon build
 	test -f install/dm_ros/share/dm_ros/package.xml
 	test -f install/dm_ros/share/dm_ros/config/presets/locker.yaml
+	test -f install/dm_ros/share/dm_ros/config/ros2_control/lsd_controllers.yaml
+	test -f install/dm_ros/share/dm_ros/config/layouts/plotjuggler_lsd.xml
 	test -f install/dm_ros/share/dm_ros/launch/differential.launch.py
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST timeout --preserve-status -s INT 5 \
 	  install/dm_ros/lib/dm_ros/differential --ros-args -p variant:=lsd_ode -p rate:=500.0 \

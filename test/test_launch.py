@@ -30,6 +30,6 @@ def test_the_page_tells_of_each_file_and_each_argument():
     names = [file.name for file in FILES]
     assert names == ['axle_pair.launch.py', 'differential.launch.py']
     arguments = [*constant('differential.launch.py', 'PARAMETERS'), 'params_file', 'namespace',
-                 'description', 'record', 'front_params_file', 'rear_params_file']
+                 'description', 'ros2_control', 'record', 'front_params_file', 'rear_params_file']
     for word in (*names, *arguments):
         assert f'`{word}`' in PAGE

@@ -14,13 +14,15 @@ from scipy.spatial.transform import Rotation
 
 from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
 from dm_ros.files.parameter_file import read_parameter_file
+from dm_ros.files.published import Published
 from dm_ros.files.urdf import ALONG, sizes, urdf
 from dm_ros.mechanism.variants import MECHANISMS, variant_named
 from dm_ros.settings import PREFIX
 from dm_ros.tools.urdf import main
 
 ROOT = Path(__file__).parents[1]
-FILES = sorted((ROOT / 'config').rglob('*.yaml'))
+FILES = sorted(path for folder in ('config', 'config/presets')
+               for path in (ROOT / folder).glob('*.yaml'))
 PREFIXES = ('', 'rear_', 'car/axle.2-')
 Z = np.array((0.0, 0.0, 1.0))
 
@@ -174,9 +176,8 @@ def test_the_joints_are_those_of_joint_states_and_followers(variant, prefix):
 
 
 def test_the_joints_have_the_names_that_the_node_publishes():
-    messages = pytest.importorskip('dm_ros.ros.messages')
     for mechanism in MECHANISMS.values():
-        published = messages.SnapshotMessages(mechanism, 'rear_').joint_states.name
+        published = Published(mechanism, 'rear_').names['joint_states']
         joints = described(mechanism, prefix='rear_').findall('joint')
         assert set(published) == {joint.get('name') for joint in joints
                                   if joint.find('mimic') is None}

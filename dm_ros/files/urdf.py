@@ -15,6 +15,8 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from dm_ros.files.ros2_control import add_ros2_control
+
 # rpy that turns z to where the first output shaft points: x is forward, y left, z up
 ALONG = {'left': (-pi / 2, 0.0, 0.0), 'front': (0.0, pi / 2, 0.0)}
 FORWARD = (0.0, pi / 2, 0.0)
@@ -189,7 +191,7 @@ def joint(robot, prefix, name, parent, xyz, rpy, leader=None):
         SubElement(element, 'mimic', joint=prefix + leader, multiplier='1', offset='0')
 
 
-def urdf(mechanism, parameters, prefix=''):
+def urdf(mechanism, parameters, prefix='', node=None, lockstep=False):
     """
     Return a URDF as text.
 
@@ -198,6 +200,10 @@ def urdf(mechanism, parameters, prefix=''):
 
     :param mechanism: its ``Mechanism``; parameters: its table.
     :param prefix: before the names of links, joints and materials, as in ``joint_states``.
+    :param node: the full name of the node that ros2_control shall drive; None for none. Then each
+        clutch is a joint too, of its slip, in an empty link.
+    :param lockstep: whether each message is a tick, so that no second one may bring the forces on
+        clutches: they are left out.
     :raises ValueError: where the parameters are too extreme to be drawn.
     """
     p, size = parameters, sizes(mechanism, parameters)
@@ -235,5 +241,11 @@ def urdf(mechanism, parameters, prefix=''):
         link.gear('satellite', size.satellite, -half, half)
         joint(robot, prefix, name, 'carrier', (middle * cos(angle), middle * sin(angle), 0.0),
               (0.0, pi / 2, angle), 'satellite' if n else None)
+    if node:
+        clutches = () if lockstep else mechanism.clutch_moments
+        for clutch in clutches:
+            Link(robot, prefix, clutch)
+            joint(robot, prefix, clutch, 'carrier', (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        add_ros2_control(robot, mechanism, prefix, node, bool(clutches))
     ElementTree.indent(robot)
     return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n'

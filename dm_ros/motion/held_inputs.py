@@ -88,6 +88,15 @@ class HeldInputs:
                 raise ValueError(f'{name!r} is not one of {", ".join(self._prefixed)}')
         return [self._prefixed[name] for name in names]
 
+    def _mismatch(self, names, what, values):
+        """Return why an array of a message is refused, and what to do about it."""
+        known = self._prefixed or self._index
+        others = [name for name in names if name not in known] if what == 'efforts' else ()
+        return (f'{len(names)} names but {len(values)} {what}: each name needs one, NaN for no '
+                f'command{", but leave out " * bool(others)}{", ".join(others)}; in ros2_control '
+                f'declare a command interface {"effort" if what == "efforts" else "velocity"} for '
+                'each joint of the system, and joints without in a system of their own')
+
     def _of_kinds(self, names, efforts, velocities):
         """Return one value for each name, the one that its port takes."""
         for name in names:
@@ -97,7 +106,7 @@ class HeldInputs:
         for what, values, needed in (('efforts', efforts, False),
                                      ('velocities', velocities, True)):
             if len(values) != len(names) and (len(values) or needed in kinds):
-                raise ValueError(f'{len(names)} names but {len(values)} {what}')
+                raise ValueError(self._mismatch(names, what, values))
         values = []
         for i, (name, is_speed) in enumerate(zip(names, kinds)):
             takes, other = (velocities, efforts) if is_speed else (efforts, velocities)
@@ -109,6 +118,8 @@ class HeldInputs:
 
     def _take(self, names, values, tick, sparse):
         if isinstance(values, Joints):
+            if not self._speeds and len(names) != len(values.efforts):
+                raise ValueError(self._mismatch(names, 'efforts', values.efforts))
             if self._prefixed:
                 names = self._without_prefix(names)
             values = (self._of_kinds(names, *values) if self._speeds else values.efforts)

@@ -4,14 +4,15 @@
 """Print a URDF of a differential, made from its parameters, for robot_state_publisher."""
 
 import argparse
+import re
 import sys
 
 from dm_ros.ending import run_command
 from dm_ros.files.output import replacing
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.urdf import urdf
-from dm_ros.mechanism.variants import variant_named, VARIANTS
-from dm_ros.settings import NodeParameters
+from dm_ros.mechanism.variants import equipped, variant_named, VARIANTS
+from dm_ros.settings import NodeParameters, port_parameters, speed_ports
 from dm_ros.tools.bias import mechanism_of
 from dm_ros.tools.passed_over import warn
 
@@ -19,6 +20,9 @@ EPILOG = """\
 Its joints are named as those in ~/joint_states, by which gears that are drawn mesh. Sizes follow
 the radii of the parameters, plates are drawn where there are clutches. doc/looking.md tells how to
 look at it in RViz and Foxglove.
+
+With --ros2-control it has what lets controllers of ros2_control drive the node, as
+doc/ros2_control.md tells; kinds of ports, and mode, are then those of FILE.
 
 The mechanism is that of the variant, or else the only one with parameters in FILE, or that of the
 default variant of the node.
@@ -34,8 +38,19 @@ def parser():
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
     result.add_argument('--joint-prefix', '--prefix', metavar='PREFIX',
                         help='before all names; default: joint_prefix of FILE')
+    result.add_argument('--ros2-control', metavar='NODE', nargs='?', const='/differential',
+                        help='with the tags of ros2_control for a node of this full name; '
+                             'default: %(const)s')
     result.add_argument('--out', metavar='OUT.urdf', help='where it goes; default: stdout')
     return result
+
+
+def node_name(words):
+    """Return the full name of a node; raise ValueError where it is none."""
+    if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', words):
+        raise ValueError(f'--ros2-control: {words!r} is not the full name of a node, '
+                         'such as /rear/differential')
+    return words
 
 
 def run(arguments):
@@ -49,7 +64,10 @@ def run(arguments):
     mechanism = mechanism_of(values, variant_named(node.variant).mechanism)
     warn('urdf', arguments.params, values, mechanism)
     p = mechanism.parameters().changed(mechanism.parameters.part_of(values))
-    text = urdf(mechanism, p, node.joint_prefix)
+    mechanism = equipped(mechanism, p, speed_ports(port_parameters(mechanism.inputs, values)))
+    text = urdf(mechanism, p, node.joint_prefix,
+                None if arguments.ros2_control is None else node_name(arguments.ros2_control),
+                node.mode == 'lockstep')
     if arguments.out:
         with replacing(arguments.out, 'w') as file:
             file.write(text)

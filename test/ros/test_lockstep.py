@@ -228,7 +228,7 @@ def test_a_run_ends_to_the_tick_and_says_so_when_nobody_answers(monkeypatch):
 
 @pytest.mark.parametrize('effort, words', [
     ((1.0, float('inf'), 3.0), 'the torque on front is inf'),
-    ((1.0, 2.0), '3 names but 2 values')])
+    ((1.0, 2.0), '3 names but 2 efforts')])
 def test_a_refused_answer_ends_the_run_at_once_with_its_words(effort, words):
     class Wrong(Controller):
         def answer(self, joints):

@@ -53,7 +53,8 @@ def warnings_of(ros, arguments):
         joints = ros.listen(JointState, '/axle/joint_states')
         ros.until(lambda: joints)
         assert process.ended(signal.SIGTERM) == 0
-        return [line for line in process.errors.splitlines() if '[WARN]' in line]
+        return [line for line in process.errors.splitlines()
+                if '[WARN]' in line and 'ticks are missed' not in line]   # as on a busy machine
 
 
 @pytest.mark.parametrize('arguments, words', [

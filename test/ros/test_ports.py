@@ -287,9 +287,9 @@ def test_a_file_is_played_with_speeds_where_the_parameters_say_so(tmp_path):
     (tmp_path / 'in.csv').write_text('time,pinion,left,right\n0.5,1,2,3\n1,4,5,6\n')
     arguments = ['--params', str(tmp_path / 'speed.yaml')]
     played = [*arguments, '--torques', str(tmp_path / 'in.csv')]
-    _, ports, at, *_ = load(parser().parse_args(played))
-    assert [port.kind for port in ports] == ['torque', 'speed', 'torque']
-    assert at(0) == (0.0, None, 0.0) and at(60) == (1.0, 2.0, 3.0)
+    played = load(parser().parse_args(played))
+    assert [port.kind for port in played.ports] == ['torque', 'speed', 'torque']
+    assert (played.values_at(0), played.values_at(60)) == ((0.0, None, 0.0), (1.0, 2.0, 3.0))
     with pytest.raises(ValueError, match='--torques: it is needed where speed comes in, on left'):
         load(parser().parse_args(arguments))
 
