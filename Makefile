@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test test-long lint bench bench-loop bench-restarts soak compare docs colcon test-jazzy-versions clean
+.PHONY: help setup run watch test test-long lint bench bench-loop bench-restarts soak compare docs colcon test-jazzy-versions clean
 
 PYTHON = python3
 VARIANT = symmetric_ode
@@ -11,6 +11,8 @@ OUT = run
 PYTEST_ARGS =
 # a worker that has nothing left takes over half of what another still has
 PARALLEL = -n auto --dist worksteal
+PORT = 8350
+WATCH_ARGS =
 BENCH_ARGS =
 COMPARE_ARGS =
 EXTRAS = ros,bag,test
@@ -71,6 +73,9 @@ run: setup  ## run the demo: VARIANT, LOSS_LAW, DURATION in s, RATE in Hz, OUT a
 	@echo "running the demo: $(DURATION) s and some"
 	.venv/bin/demo --variant $(VARIANT) --loss-law $(LOSS_LAW) --duration $(DURATION) --rate $(RATE) --out $(OUT)
 
+watch: setup  ## serve a page that shows a running node: PORT, WATCH_ARGS such as --control
+	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST .venv/bin/watch --port $(PORT) $(WATCH_ARGS)
+
 test: setup  ## run the tests: PYTEST_ARGS
 	@echo "running the tests: some minutes on two cores"
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg \
@@ -118,6 +123,7 @@ colcon: .venv/colcon  ## build the package with colcon, check what it installs, 
 	test -f install/dm_ros/share/dm_ros/config/ros2_control/lsd_controllers.yaml
 	test -f install/dm_ros/share/dm_ros/config/layouts/plotjuggler_lsd.xml
 	test -f install/dm_ros/share/dm_ros/launch/differential.launch.py
+	test -f install/dm_ros/lib/python*/site-packages/dm_ros/watch/web/uplot/uPlot.iife.min.js
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST timeout --preserve-status -s INT 5 \
 	  install/dm_ros/lib/dm_ros/differential --ros-args -p variant:=lsd_ode -p rate:=500.0 \
 	  --params-file install/dm_ros/share/dm_ros/config/lsd.yaml

@@ -27,7 +27,7 @@ setup(
         (f'share/{NAME}/config/ros2_control', glob('config/ros2_control/*')),
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
     ],
-    package_data={NAME: ['ros/*.xml']},
+    package_data={NAME: ['ros/*.xml', 'watch/web/*', 'watch/web/uplot/*']},
     ext_modules=[Extension(   # never required: without a compiler Python does it all
         f'{NAME}._core', sorted(glob('core/*.c')), depends=glob('core/*.h'), optional=True,
         py_limited_api=True, extra_compile_args=[   # equal bits: no fused multiply-add
@@ -37,6 +37,7 @@ setup(
     install_requires=['numpy>=1.26', 'scipy>=1.11', 'PyYAML', 'tqdm'],
     extras_require={
         'bag': ['rosbags>=0.11.9'],
+        'browser': ['selenium>=4.11'],
         'mcap': ['mcap-ros2-support'],
         'physics': ['mujoco>=4'],
         'plot': [MATPLOTLIB],
@@ -53,6 +54,7 @@ setup(
             'play_torques = dm_ros.commands:play_torques',
             'simulate = dm_ros.commands:simulate',
             'urdf = dm_ros.commands:urdf',
+            'watch = dm_ros.commands:watch',
         ],
         'pytest11': ['dm_ros = dm_ros.testing.pytest_plugin'],
     },

@@ -20,6 +20,7 @@ COMMANDS = {
     'play_torques': ('tools.play_torques', True),
     'simulate': ('tools.simulate', False),
     'urdf': ('tools.urdf', False),
+    'watch': ('tools.watch', True),
 }
 
 
@@ -34,7 +35,7 @@ def run(name, args=None):
     return import_module(f'dm_ros.{module}').main(args)
 
 
-bias, compare_variants, demo, differential, play_torques, simulate, urdf = (
+bias, compare_variants, demo, differential, play_torques, simulate, urdf, watch = (
     partial(run, name) for name in COMMANDS)
 
 

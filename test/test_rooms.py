@@ -7,6 +7,7 @@ import ast
 import importlib
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -14,8 +15,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1] / 'dm_ros'
 FLOORS = [   # from the ground up; a file of the package itself is a room of its own
-    {'ending', 'core'}, {'mechanism'}, {'motion'}, {'settings'}, {'plant', 'files'}, {'ros'},
-    {'tools', 'testing'}, {'__init__', 'bias', 'commands', 'energy'}]
+    {'ending', 'core'}, {'mechanism'}, {'motion'}, {'settings'}, {'plant', 'files'}, {'watch'},
+    {'ros'}, {'tools', 'testing'}, {'__init__', 'bias', 'commands', 'energy'}]
 KNOW_ROS = {'ros', 'tools', 'testing'}
 PRIVATES = ROOT / 'ros' / 'privates.py'
 INNER = {'handle', 'impl', 'take_message', 'WaitSet', 'ParameterService'}   # names within rclpy
@@ -78,6 +79,22 @@ def test_every_file_is_in_a_room_that_is_known():
 def test_no_file_asks_for_a_second_look():
     assert not {str(path): lines for path in FILES
                 if (lines := len(path.read_text().splitlines())) > 400}
+
+
+def test_no_script_of_the_page_does_either():
+    own = [path for path in (ROOT / 'watch' / 'web').iterdir() if path.is_file()]
+    assert len(own) > 8
+    assert not {path.name: lines for path in own
+                if (lines := len(path.read_text().splitlines())) > 400}
+
+
+def test_all_files_of_the_page_are_installed():
+    setup = (ROOT.parent / 'setup.py').read_text()
+    patterns = re.search(r'package_data=\{NAME: \[(.*)\]\}', setup).group(1)
+    installed = {path for pattern in re.findall(r"'(.+?)'", patterns)
+                 for path in ROOT.glob(pattern)}
+    web = {path for path in (ROOT / 'watch' / 'web').rglob('*') if path.is_file()}
+    assert web <= installed
 
 
 def test_only_the_rooms_of_ros_import_it():

@@ -9,7 +9,7 @@ import shutil
 
 import numpy as np
 
-from dm_ros.files.published import Commands, Published
+from dm_ros.files.published import CommandMessage, Published
 
 JOINT_STATE, INT8 = 'sensor_msgs/msg/JointState', 'std_msgs/msg/Int8'
 OF_A_BAG = re.compile(r'metadata\.yaml|.*\.mcap')
@@ -117,8 +117,8 @@ class TickBag:
         commands, outputs = quality(INPUT_DEPTH), quality(OUTPUT_DEPTH)
         ports = self._mechanism.ports
         # with the forces of clutches where any come
-        self._commands = [Commands(ports, self._prefix),
-                          Commands(ports + self._mechanism.actuators, self._prefix)]
+        self._commands = [CommandMessage(ports, self._prefix),
+                          CommandMessage(ports + self._mechanism.actuators, self._prefix)]
         self._torques = bag.topic(f'{node}/torques', JOINT_STATE, commands)
         self._topics = [(bag.topic(f'{node}/{topic}', JOINT_STATE, outputs), names)
                         for topic, names in self._published.names.items()]

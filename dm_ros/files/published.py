@@ -59,7 +59,7 @@ class Published:
         return array('d', [values[i] - carrier for i in self._clutched])
 
 
-class Commands:
+class CommandMessage:
     """A message on ``~/torques``: ``names``, and the arrays for a value of each port."""
 
     def __init__(self, ports, prefix=''):

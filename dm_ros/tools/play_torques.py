@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from dm_ros.ending import ignore_signals, run_command
 from dm_ros.files.bag import Bag
 from dm_ros.files.parameter_file import read_parameter_file
-from dm_ros.files.published import Commands
+from dm_ros.files.published import CommandMessage
 from dm_ros.files.recorded_drive import is_bag, read_drive
 from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import (
@@ -115,7 +115,7 @@ class Player:
         self._node, self._taps = node, taps
         reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
         self._publisher = node.create_publisher(JointState, topic_of(target), reliable)
-        self._idle, self._commands = [port.idle for port in ports], Commands(ports, prefix)
+        self._idle, self._commands = [port.idle for port in ports], CommandMessage(ports, prefix)
         self._message = JointState(name=self._commands.names)
 
     def wait(self, seconds):

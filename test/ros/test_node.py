@@ -124,7 +124,7 @@ def test_two_controllers_share_the_torques_topic_within_a_tick(ros):
     (['pinion', 'wheel'], [5.0, 5.0], 'wheel'),
     (['pinion', 'pinion'], [5.0, 5.0], 'twice'),
     (['pinion', 'left'], [5.0], '2 names'),
-    (['pinion'], [], '0 values'),
+    (['pinion'], [], '0 efforts'),
 ])
 def test_a_bad_message_is_refused_whole_and_the_node_goes_on(ros, names, efforts, why):
     node = ros.differential(torque_timeout=0.0)

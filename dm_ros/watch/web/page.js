@@ -1,0 +1,164 @@
+// Copyright 2026 dm_ros developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The page: takes the events of the server and lets each part show them.
+
+import {Control} from './control.js';
+import {Drawing} from './drawing.js';
+import {Diagnostics, Labels, Legend, Most, numbersOf, powersOf} from './panels.js';
+import {Strips} from './strips.js';
+
+const AGAIN = 2000;      // ms until the server is asked again
+const STRIPS = 0.06;     // s from one drawing of the strips to the next
+const LATE = 0.025;      // s from one frame to the next that are too long
+const SPARING = 30;      // s for which fewer frames are drawn after too many were late
+const SILENT = 1;        // s without a tick, or some ticks of a slow node
+const $ = id => document.getElementById(id);
+
+const drawing = new Drawing($('drawing'));
+const strips = new Strips($('strips'), drawing.colours);
+const labels = new Labels($('labels')), legend = new Legend($('legend'));
+const diagnostics = new Diagnostics($('diagnostics'), $('alarm'));
+const control = new Control($('control'));
+drawing.onResize = () => {
+  drawing.labels = labels.boxes($('drawing').getBoundingClientRect());
+};
+let scene = null, heard = null, connected = false, paused = false;
+let most = {power: new Most(), heat: new Most()};
+
+const seconds = () => performance.now() / 1000;
+
+function show(description) {
+  const same = scene && description.variant
+    && JSON.stringify(scene.strips) === JSON.stringify(description.strips);
+  scene = description.variant ? description : null;
+  heard = null;
+  paused = false;
+  document.title = `${description.node} \u2013 watch`;
+  $('node').textContent = description.node;
+  $('kind').textContent = scene
+    ? `${scene.variant}, ${scene.rate} Hz, ${scene.mode}, ${scene.law} law of losses` : '';
+  $('waiting').hidden = Boolean(scene);
+  document.querySelector('main').classList.toggle('waiting', !scene);
+  document.querySelector('.node').textContent = description.node;
+  $('refusal').hidden = !description.refusal;
+  $('refusal').textContent = `It is there, but cannot be shown: ${description.refusal}`;
+  $('how').textContent = how(description.node);
+  $('loss').textContent = '';
+  most = {power: new Most(), heat: new Most()};
+  drawing.show(scene);
+  labels.show(scene, drawing.colours);
+  drawing.onResize();
+  legend.show(scene, drawing.colours);
+  if (!same) {
+    strips.show(scene);
+    diagnostics.tell([]);
+  }
+  control.show(scene);
+  $('scale').textContent = '';
+  $('note').textContent = !scene ? '' : !scene.gears ? `not drawn: ${scene['not drawn']}`
+    : scene.gears.exact ? '' : 'ratios and numbers of gears are drawn near the true ones';
+}
+
+// The commands that start a node of this name, and a load.
+function how(node) {
+  const [, space, name] = node.match(/^(.*)\/([^/]+)$/);
+  const inSpace = space ? ` -r __ns:=${space}` : '';
+  const renamed = name === 'differential' ? '' : ` -r __node:=${name}`;
+  return `ros2 run dm_ros differential --ros-args -p variant:=lsd_ode${inSpace}${renamed}\n`
+    + `ros2 run dm_ros play_torques --variant lsd_ode${renamed && ` --node ${name}`}`
+    + `${inSpace && ` --ros-args${inSpace}`}`;
+}
+
+function ticks({emptied, rows, now}) {
+  strips.add(rows, emptied);
+  if (!scene || !now) return;
+  heard = seconds();
+  paused = false;
+  labels.tell(now);
+  strips.tell(numbersOf(scene, now));
+  drawing.turn(now.travel, Math.max(...now.velocity.map(Math.abs)), heard);
+  const powers = powersOf(scene, now);
+  powers.most = {power: most.power.of(Object.values(powers.meshes).concat(
+    Object.values(powers.shafts)), heard), heat: most.heat.of(Object.values(powers.clutches), heard)};
+  drawing.colour(powers);
+  legend.tell(powers);
+  if (scene.gears) {
+    const slower = Math.round(1 / drawing.scale);
+    $('scale').textContent = slower > 1 ? `drawn at 1/${slower} speed` : 'drawn at true speed';
+  }
+  if (now.lost) $('loss').textContent = `${now.lost} tick${now.lost > 1 ? 's' : ''} not heard whole`;
+}
+
+function told(statuses) {
+  diagnostics.tell(statuses);
+  paused = statuses.some(({name, message}) => name === 'loop' && message === 'paused');
+}
+
+// What the node is doing, in words, and how good that is.
+function state() {
+  if (!connected) return ['no connection to watch', 'error'];
+  if (!scene) return ['waiting for the node', 'warn'];
+  const quiet = heard === null ? Infinity : seconds() - heard;
+  if (quiet < Math.max(SILENT, 5 / scene.rate)) return ['running', 'ok'];
+  if (paused) return ['paused', 'warn'];
+  if (scene.mode === 'lockstep') return ['waits for messages on ~/torques', ''];
+  return [heard === null ? 'no tick yet' : `no tick for ${Math.round(quiet)} s`, 'warn'];
+}
+
+function tellState() {
+  const [words, level] = state();
+  $('state').textContent = words;
+  $('state').className = `badge ${level}`;
+}
+
+function connect() {
+  const source = new EventSource('events');
+  const on = (name, take) => source.addEventListener(
+    name, ({data}) => take(JSON.parse(data)));
+  on('viewer', name => {
+    control.viewer = name;
+    connected = true;
+  });
+  on('scene', show);
+  on('ticks', ticks);
+  on('diagnostics', told);
+  on('commands', values => control.tell(values));
+  source.addEventListener('error', () => {
+    connected = false;
+    source.close();
+    setTimeout(connect, AGAIN);
+  });
+}
+
+let before = seconds(), turned = before, drawn = 0;
+let frames = 0, late = 0, sparingUntil = 0;
+function frame() {
+  const now = seconds();
+  frames += 1;
+  late += now - before > LATE;
+  before = now;
+  if (frames === 120) {   // where no hardware helps, as in a virtual machine, half as many will do
+    if (late > 40) sparingUntil = now + SPARING;
+    frames = late = 0;
+  }
+  const sparing = now < sparingUntil;
+  if (!sparing || now - turned > LATE) {
+    drawing.frame(now - turned);
+    turned = now;
+  }
+  if (now - drawn > (sparing ? 2 : 1) * STRIPS) {
+    drawn = now;
+    strips.draw();
+  }
+  requestAnimationFrame(frame);
+}
+
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+  strips.recolour(drawing.colours);
+  labels.show(scene, drawing.colours);
+  legend.show(scene, drawing.colours);
+});
+setInterval(tellState, 200);
+connect();
+requestAnimationFrame(frame);

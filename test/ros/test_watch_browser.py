@@ -1,0 +1,304 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The page of ``watch`` in a browser, where one is installed: what an engineer sees and does."""
+
+from contextlib import contextmanager
+import json
+import math
+import re
+import shutil
+import signal
+
+from processes import command, Forked
+import pytest
+from sensor_msgs.msg import JointState
+
+from dm_ros.mechanism.variants import MECHANISMS
+from dm_ros.watch.scene import Scene
+
+webdriver = pytest.importorskip('selenium.webdriver')
+BROWSER, DRIVER = (next(filter(None, map(shutil.which, names)), None) for names in (
+    ('chromium', 'chromium-browser', 'google-chrome'), ('chromedriver',)))
+pytestmark = pytest.mark.skipif(not (BROWSER and DRIVER), reason='no Chromium with its driver')
+
+PICTURE = "return document.getElementById('drawing').toDataURL()"
+# the pictures of some frames, so that what turns has time to turn
+PICTURES = """
+const [count, done] = arguments, seen = [];
+const look = () => {
+  seen.push(document.getElementById('drawing').toDataURL());
+  if (seen.length < count) setTimeout(() => requestAnimationFrame(look), 30);
+  else done(new Set(seen).size);
+};
+requestAnimationFrame(look);
+"""
+# how far the teeth of each pair are from tooth in gap, 0 to 0.5 of the pitch, the worst of all
+MESHING = """
+const [scenes, done] = arguments;
+import('/mechanism.js').then(({Mechanism}) => {
+  const minus = (p, q) => p.map((x, i) => x - q[i]);
+  const dot = (p, q) => p.reduce((sum, x, i) => sum + x * q[i], 0);
+  // where a point of the world is among the teeth of a wheel, in pitches
+  const phase = ({solid, frame}, angles, point) => {
+    const {origin, axes: [, y, z]} = frame(angles), arm = minus(point, origin);
+    return Math.atan2(dot(arm, z), dot(arm, y)) * solid.teeth / (2 * Math.PI);
+  };
+  const off = x => Math.abs(x - Math.round(x));
+  let worst = 0, pairs = 0, turned = 0;
+  for (const scene of scenes) {
+    const mechanism = new Mechanism(scene.gears, scene);
+    const wheels = mechanism.parts.filter(part => part.meshes.length);
+    const found = new Map();
+    for (let n = 0; n < 40; n++) {
+      const angles = mechanism.angles(0.37 * n, -0.91 * n * (n % 3));
+      for (const [mesh, points] of Object.entries(mechanism.contacts(angles))) {
+        const own = wheels.filter(part => part.meshes.includes(mesh));
+        const big = own.find(part => part.meshes.length === 1);
+        const small = own.filter(part => part !== big);
+        points.forEach((point, i) => {
+          const one = phase(big, angles, point), other = phase(small[i], angles, point);
+          const key = mesh + i, before = found.get(key) || [0, 0];
+          // turned the same way, or against each other: one of them holds for a pair
+          found.set(key, [Math.max(before[0], off(one - other + 0.5)),
+            Math.max(before[1], off(one + other + 0.5))]);
+          turned = Math.max(turned, off(one));
+        });
+      }
+    }
+    for (const errors of found.values()) {
+      worst = Math.max(worst, Math.min(...errors));
+      pairs += 1;
+    }
+  }
+  done([worst, pairs, turned]);
+}, error => done(String(error)));
+"""
+
+
+@pytest.fixture(scope='module')
+def chromium():
+    options = webdriver.ChromeOptions()
+    options.binary_location = BROWSER
+    for argument in ('--headless=new', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage',
+                     '--window-size=1280,800'):
+        options.add_argument(argument)
+    options.set_capability('goog:loggingPrefs', {'browser': 'ALL', 'performance': 'ALL'})
+    driver = webdriver.Chrome(options=options,
+                              service=webdriver.ChromeService(executable_path=DRIVER))
+    driver.set_script_timeout(60.0)
+    yield driver
+    driver.quit()
+
+
+class Screen:
+    """The page in the browser."""
+
+    def __init__(self, driver, url):
+        self.driver, self.url = driver, url
+        driver.get(url)
+
+    def text(self, selector):
+        """Return the text that is seen of an element."""
+        return self.driver.find_element('css selector', selector).text
+
+    def numbers(self, kind):
+        """Return {shaft: number} of the labels."""
+        found = self.driver.execute_script(
+            f'return [...document.querySelectorAll("[data-{kind}]")].map('
+            f'e => [e.dataset.{kind}, e.textContent])')
+        return {shaft: float(text.split()[0].replace('\N{MINUS SIGN}', '-'))
+                for shaft, text in found if text != '\N{EN DASH}'}
+
+    def different(self, count):
+        """Return how many of some pictures in a row differ."""
+        return self.driver.execute_async_script(PICTURES, count)
+
+    def move(self, name, value):
+        """Move a slider, as a hand does."""
+        self.driver.execute_script("""
+            const slider = document.querySelector(
+                `#control input[type=range][name=${arguments[0]}]`);
+            slider.value = arguments[1];
+            slider.dispatchEvent(new Event('input', {bubbles: true}));""", name, value)
+
+    def press(self, words):
+        """Press a button."""
+        self.driver.execute_script("""
+            [...document.querySelectorAll('#control button')].find(
+                button => button.textContent === arguments[0]).click();""", words)
+
+
+@pytest.fixture
+def screen(ros, chromium):
+    """Return a function that starts ``watch`` and opens its page, without errors in the end."""
+    processes = []
+    chromium.get('about:blank')
+    for kind in ('browser', 'performance'):
+        chromium.get_log(kind)   # of others
+
+    def screen(*arguments):
+        processes.append(Forked(command('watch'), '--port', 0, *arguments))
+        processes[-1].says('/\n')
+        url = re.search(r'http\S+', processes[-1].output).group()
+        return Screen(chromium, url)
+    yield screen
+    urls = [message['params']['request']['url'] for entry in chromium.get_log('performance')
+            if (message := json.loads(entry['message'])['message'])['method']
+            == 'Network.requestWillBeSent']
+    own = re.search(r'http\S+', processes[-1].output).group()
+    errors = chromium.get_log('browser')
+    chromium.get('about:blank')
+    for process in processes:
+        process.__exit__()
+    assert len(urls) > 10 and not [url for url in urls if not url.startswith(own)]
+    assert not errors
+
+
+@pytest.mark.parametrize('variant, shaft', [('symmetric_ode', 'left'), ('lsd_ode', 'rear')])
+def test_the_picture_turns_as_the_shafts_do_and_stands_while_paused(ros, screen, variant, shaft):
+    node = ros.differential(variant, **{f'initial_velocity__{shaft}': 30.0})
+    it = screen()
+    ros.until(lambda: it.text('#state') == 'running')
+    ros.until(lambda: it.different(8) > 4)
+    assert node.control.running.is_set()
+    node.control.running.clear()
+    ros.until(lambda: it.different(4) == 1)
+    ros.until(lambda: it.text('#state') == 'paused')
+    assert it.different(12) == 1
+    node.control.running.set()
+    ros.until(lambda: it.different(8) > 4)
+
+
+def test_a_shaft_that_stands_is_drawn_so(ros, screen):
+    ros.differential()
+    it = screen()
+    ros.until(lambda: it.text('#state') == 'running')
+    ros.until(lambda: it.different(4) == 1)
+    assert len(it.driver.execute_script(PICTURE)) > 10_000   # there is a picture
+
+
+@pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])
+def test_the_labels_have_speeds_and_torques_of_the_topics(ros, screen, variant):
+    shaft = MECHANISMS[variant.split('_')[0]].outputs[1]
+    node = ros.differential(variant, mode='lockstep', **{f'initial_velocity__{shaft}': 12.0})
+    joints = ros.listen(JointState, '/differential/joint_states')
+    it = screen()
+    ros.until(lambda: it.text('#state') == 'waits for messages on ~/torques')
+    first, second, third = node.simulation.inputs
+    torques = ros.publisher(JointState, '/differential/torques')
+    torques.publish(JointState(name=[first, second, third], effort=[40.0, -12.5, -3.25]))
+    ros.until(lambda: joints and it.numbers('speed'))
+    for name, array in (('speed', joints[-1].velocity), ('torque', joints[-1].effort)):
+        expected = dict(zip(joints[-1].name, array))
+        for shaft, told in it.numbers(name).items():
+            assert told == pytest.approx(expected[shaft], rel=1e-3, abs=6e-4), shaft
+    assert set(it.numbers('speed')) == set(node.simulation.shafts)
+
+
+def test_a_slider_reaches_the_topic_and_zero_all_takes_it_back(ros, screen):
+    node = ros.differential('lsd_ode')
+    messages = []
+    ros.node.create_subscription(JointState, '/differential/torques', messages.append, 1000)
+    it = screen('--control')
+    ros.until(lambda: it.text('#state') == 'running')
+    it.move('carrier', 80)
+    it.move('rear_clutch', 400)
+    ros.until(lambda: messages and len(messages[-1].name) == 2)
+    commanded = dict(zip(messages[-1].name, messages[-1].effort))
+    assert commanded == {'carrier': pytest.approx(80.0, abs=1.0),
+                         'rear_clutch': pytest.approx(400.0, abs=10.0)}
+    ros.until(lambda: it.numbers('torque')['carrier'] == commanded['carrier'])
+    it.press('Zero all')
+    ros.until(lambda: list(messages[-1].effort) == [0.0] * 5)
+    it.press('Let go')
+    count = len(messages)
+    ros.until(lambda: node.plant.inputs.stale(node.simulation.ticks))
+    assert len(messages) - count < 20 and not node.plant.inputs.refused
+
+
+def test_the_buttons_pause_step_and_go_on(ros, screen):
+    node = ros.differential()
+    it = screen('--control')
+    ros.until(lambda: it.text('#state') == 'running')
+    it.press('Pause')
+    ros.until(lambda: not node.control.running.is_set())
+    ticks = node.plant.ticks
+    it.press('Step')
+    ros.until(lambda: node.plant.ticks == ticks + 1)
+    it.press('Continue')
+    ros.until(lambda: node.control.running.is_set())
+    ros.until(lambda: it.text('#answer') == 'continue: running')
+
+
+def test_without_control_there_is_nothing_to_press(ros, screen):
+    ros.differential()
+    it = screen()
+    ros.until(lambda: it.text('#state') == 'running')
+    assert not it.driver.find_elements('css selector', 'button, input')
+
+
+def test_a_warning_is_seen_at_once_and_its_values_unfold(ros, screen):
+    ros.differential()
+    it = screen()
+    ros.until(lambda: it.text('#state') == 'running')
+    publisher = ros.publisher(JointState, '/differential/torques')
+    refused = JointState(name=['nobody'], effort=[1.0])
+
+    def is_told():
+        publisher.publish(refused)
+        return 'torques: messages are refused' in it.text('#alarm')
+    ros.until(is_told)
+    assert "'nobody'" not in it.text('#diagnostics')
+    for summary in it.driver.find_elements('css selector', '#diagnostics summary'):
+        summary.click()
+    ros.until(lambda: "'nobody' is not one of pinion, left, right" in it.text('#diagnostics'))
+
+
+def test_the_page_waits_for_a_node_and_finds_the_next_of_another_variant(ros, screen):
+    it = screen()
+    ros.until(lambda: 'ros2 run dm_ros differential' in it.text('#waiting'))
+    for variant, shaft in (('lsd_ode', 'front'), ('symmetric_ode', 'pinion')):
+        with Forked(command('differential'), '--ros-args', '-p', f'variant:={variant}') as node:
+            ros.until(lambda: it.text('#kind').startswith(variant)  # noqa: B023
+                      and shaft in it.numbers('speed'))  # noqa: B023
+            node.ended(signal.SIGINT)
+            ros.until(lambda: it.text('#state') == 'waiting for the node')
+
+
+@contextmanager
+def width_of(driver, width, height=800):
+    driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
+        'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': False})
+    yield
+    driver.execute_cdp_cmd('Emulation.clearDeviceMetricsOverride', {})
+
+
+@pytest.mark.parametrize('width', [360, 800, 1280])
+def test_all_is_within_the_width_of_the_screen(ros, screen, chromium, width):
+    ros.differential('lsd_ode', lsd__clutch__rear__friction_surfaces=3)
+    with width_of(chromium, width):
+        it = screen('--control')
+        ros.until(lambda: it.text('#state') == 'running')
+        ros.until(lambda: len(it.driver.find_elements('css selector', '.uplot canvas')) == 6)
+        ros.until(lambda: it.driver.execute_script(
+            'return document.documentElement.scrollWidth') <= width)
+        boxes = it.driver.execute_script(
+            'return [...document.querySelectorAll(".label")].map(e => e.getBoundingClientRect())')
+        for n, one in enumerate(boxes):
+            for other in boxes[:n]:
+                assert (one['left'] >= other['right'] or other['left'] >= one['right']
+                        or one['top'] >= other['bottom'] or other['top'] >= one['bottom'])
+
+
+def test_the_teeth_mesh_wherever_the_shafts_are(ros, screen):
+    values = [{'variant': 'symmetric_ode'}, {'variant': 'lsd_ode'}]
+    values += [{'variant': 'symmetric_ode', 'symmetric.final_drive_ratio': ratio,
+                'symmetric.satellite_count': count}
+               for ratio in (-3.517, 2.2, -4.1) for count in (1, 3, 4)]
+    values += [{'variant': 'lsd_ode', 'lsd.satellite_count': count, 'lsd.satellite_ratio': ratio}
+               for count in (1, 2, 3, 5) for ratio in (0.3, 10 / 24)]
+    worst, pairs, turned = screen().driver.execute_async_script(
+        MESHING, [Scene('/d', value).description for value in values])
+    assert pairs > 60 and turned > 0.4
+    assert worst < 1e-9 and math.isfinite(worst)
