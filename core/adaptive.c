@@ -4,21 +4,10 @@
  * The adaptive step: see dm_ros/motion/adaptive.py.
  */
 
-#include <math.h>
-
 #include "exponentials.h"
 
 static const double BACKWARD = 3.0, SAFETY = 0.8, SHRINK = 0.1, GROW = 5.0;
 enum { MOST_RESORTS = 1000 };
-
-double dm_quotient(step *job, double a, double b)
-{
-    if (b == 0.0) {
-        job->broken = 1;
-        return NAN;
-    }
-    return a / b;
-}
 
 /* Return h (3 I - |h| J)^-1 (f(there) - f(here) - J d) of two points that are d apart. */
 static pair nonlinear_part(step *job, const point *here, const point *there, matrix J, double h,
@@ -29,8 +18,8 @@ static pair nonlinear_part(step *job, const point *here, const point *there, mat
     const double k = fabs(h);
     const double a = 3 - k * J.ww, b = k * J.ws, c = k * J.sw, d = 3 - k * J.ss;
     const double det = a * d - b * c;
-    return (pair){dm_quotient(job, d * D_w + b * D_s, det),
-                  dm_quotient(job, c * D_w + a * D_s, det)};
+    return (pair){quotient(job, d * D_w + b * D_s, det),
+                  quotient(job, c * D_w + a * D_s, det)};
 }
 
 /* Book a part of the path; the first one is what it is, the others are added. */
@@ -65,7 +54,7 @@ int dm_advance(step *job, pair y)
         double i_w = h * (w + h * v.w), i_s = h * (s + h * v.s);
         const pair c = nonlinear_part(job, &here, &there, J, h, d_w, d_s);
         const double allowed = job->tolerance + law->relative * (fabs(d_w) + fabs(d_s));
-        double error = dm_quotient(job, fabs(c.w) + fabs(c.s), allowed);
+        double error = quotient(job, fabs(c.w) + fabs(c.s), allowed);
         int is_known = 0;
         if (error <= 1.0) {
             there = law->evaluate(job, w + d_w + c.w, s + d_s + c.s);
@@ -74,7 +63,7 @@ int dm_advance(step *job, pair y)
                 is_known = 1;
                 const pair r = nonlinear_part(job, &there, &here, at_end.J, -h, -d_w - c.w,
                                               -d_s - c.s);
-                const double seen = dm_quotient(job, fabs(r.w) + fabs(r.s), BACKWARD * allowed);
+                const double seen = quotient(job, fabs(r.w) + fabs(r.s), BACKWARD * allowed);
                 if (seen > error)
                     error = seen;
             }
@@ -118,7 +107,7 @@ int dm_advance(step *job, pair y)
         }
         there = law->evaluate(job, end.w, end.s);
         const double d_w = end.w - w, d_s = end.s - s;
-        const pair f = {dm_quotient(job, d_w, h), dm_quotient(job, d_s, h)};
+        const pair f = {quotient(job, d_w, h), quotient(job, d_s, h)};
         book(job, !booked++, &(part){{w, s}, f, at_start, h, {d_w, d_s}, {0.0, 0.0}, turned, 1,
                                      &here, &there});
         angle_w += turned.w;

@@ -4,8 +4,6 @@
  * The motion of a differential with clutches: see dm_ros/mechanism/clutched.py.
  */
 
-#include <math.h>
-
 #include "clutched.h"
 
 /* Solve M = z - W diag(x) |M|; y: the factors where a moment is negative. */
@@ -19,8 +17,8 @@ static pair solve_moments(step *job, pair z, const clutched_coefficients *k, pai
         const double a = 1 + k->W_11 * x_1 * sign_1, b = k->W_12 * x_2 * sign_2;
         const double c = k->W_21 * x_1 * sign_1, d = 1 + k->W_22 * x_2 * sign_2;
         const double det = a * d - b * c;
-        const double M_1 = dm_quotient(job, d * z.w - b * z.s, det);
-        const double M_2 = dm_quotient(job, a * z.s - c * z.w, det);
+        const double M_1 = quotient(job, d * z.w - b * z.s, det);
+        const double M_2 = quotient(job, a * z.s - c * z.w, det);
         double wrong = 0.0;
         if (-M_1 * sign_1 > wrong)
             wrong = -M_1 * sign_1;
@@ -47,8 +45,8 @@ static point evaluate(step *job, double w, double s)
     double x_2 = z_2 >= 0.0 ? k->phi_2 * t_2 : -(k->psi_2 * t_2);
     const double a = 1 + W_11 * x_1, b = W_12 * x_2, c = W_21 * x_1, d = 1 + W_22 * x_2;
     const double det = a * d - b * c;
-    double M_1 = dm_quotient(job, d * z_1 - b * z_2, det);
-    double M_2 = dm_quotient(job, a * z_2 - c * z_1, det);
+    double M_1 = quotient(job, d * z_1 - b * z_2, det);
+    double M_2 = quotient(job, a * z_2 - c * z_1, det);
     if (M_1 * z_1 < 0.0 || M_2 * z_2 < 0.0) {
         const pair M = solve_moments(
             job, (pair){z_1, z_2}, k, (pair){k->phi_1 * t_1, k->phi_2 * t_2},
@@ -79,12 +77,12 @@ static slopes jacobian(step *job, const point *at)
     const double d = 1 + x_2 * k->W_22;
     const double det = a * d - b * c;
     double r_1 = x_1 * k->P_1w, r_2 = x_2 * k->P_2w;
-    const double F_1w = dm_quotient(job, d * r_1 - b * r_2, det);
-    const double F_2w = dm_quotient(job, a * r_2 - c * r_1, det);
+    const double F_1w = quotient(job, d * r_1 - b * r_2, det);
+    const double F_2w = quotient(job, a * r_2 - c * r_1, det);
     r_1 = x_1 * k->P_1s + N_1;
     r_2 = x_2 * k->P_2s + N_2;
-    const double F_1s = dm_quotient(job, d * r_1 - b * r_2, det);
-    const double F_2s = dm_quotient(job, a * r_2 - c * r_1, det);
+    const double F_1s = quotient(job, d * r_1 - b * r_2, det);
+    const double F_2s = quotient(job, a * r_2 - c * r_1, det);
     return (slopes){{k->A_ww - k->C_w1 * F_1w - k->C_w2 * F_2w,
                      k->A_ws - k->C_w1 * F_1s - k->C_w2 * F_2s,
                      k->A_sw - k->C_s1 * F_1w - k->C_s2 * F_2w,

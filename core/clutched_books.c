@@ -4,8 +4,6 @@
  * The books of a step under the paper's law: see ClutchedMeter in dm_ros/motion/meters.py.
  */
 
-#include <math.h>
-
 #include "clutched.h"
 #include "exponentials.h"
 #include "quadrature.h"

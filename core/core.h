@@ -8,6 +8,8 @@
 #ifndef DM_ROS_CORE_H
 #define DM_ROS_CORE_H
 
+#include <math.h>
+
 enum { HELD = 6, STATE = 7, SOLVED = 17, LOST = 8 };
 
 typedef struct {
@@ -89,7 +91,14 @@ typedef struct context {
 } context;
 
 /* Return a/b; where b is zero the job is broken, as an exception of Python ends it. */
-double dm_quotient(step *job, double a, double b);
+static inline double quotient(step *job, double a, double b)
+{
+    if (b == 0.0) {
+        job->broken = 1;
+        return NAN;
+    }
+    return a / b;
+}
 
 /* Put a root of a function that grows on the whole into found; return 0 where none is in reach. */
 int dm_root(const context *f, double start, double *found);

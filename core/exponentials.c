@@ -4,8 +4,6 @@
  * Exponentials of 2x2 matrices: see dm_ros/motion/exponentials.py.
  */
 
-#include <math.h>
-
 #include "exponentials.h"
 
 static const double STEEPEST = 300.0, SMALL = 0.02, APART = 1e-4;
@@ -20,7 +18,7 @@ static double phi_2(step *job, double z)
     if (fabs(z) < SMALL)
         return (1.0 / 2 + z * (1.0 / 6 + z * (1.0 / 24 + z * (1.0 / 120 + z * (
             1.0 / 720 + z / 5040)))));
-    return dm_quotient(job, expm1(bounded(z)) - z, z * z);
+    return quotient(job, expm1(bounded(z)) - z, z * z);
 }
 
 /* Return phi_2 of a + ib, b > 0, as a real and an imaginary part. */
@@ -42,7 +40,7 @@ static pair complex_phi_2(step *job, double a, double b)
     const double size = c * c + d * d;
     if (isinf(b))   /* of which Python takes no cosine */
         job->broken = 1;
-    return (pair){dm_quotient(job, p * c + q * d, size), dm_quotient(job, q * c - p * d, size)};
+    return (pair){quotient(job, p * c + q * d, size), quotient(job, q * c - p * d, size)};
 }
 
 pair dm_apply_phi_2(step *job, double z_11, double z_12, double z_21, double z_22, double v_1,
@@ -56,7 +54,7 @@ pair dm_apply_phi_2(step *job, double z_11, double z_12, double z_21, double z_2
         const pair turning = complex_phi_2(job, mean, root);
         center = mean;
         value = turning.w;
-        slope = dm_quotient(job, turning.s, root);
+        slope = quotient(job, turning.s, root);
     } else {
         center = mean + root;
         value = phi_2(job, center);
@@ -76,8 +74,8 @@ void dm_way(step *job, matrix J, pair f, double h, int count, const double *r, p
     if (square > 1e-6 * mean * mean) {   /* two modes that are far from each other */
         const double root = sqrt(square);
         const double high = mean + root, low = mean - root;
-        const double b_1 = dm_quotient(job, (high - J.ww) * f.w - J.ws * f.s, 2 * root);
-        const double b_2 = dm_quotient(job, (high - J.ss) * f.s - J.sw * f.w, 2 * root);
+        const double b_1 = quotient(job, (high - J.ww) * f.w - J.ws * f.s, 2 * root);
+        const double b_2 = quotient(job, (high - J.ss) * f.s - J.sw * f.w, 2 * root);
         const double a_1 = f.w - b_1, a_2 = f.s - b_2;
         for (int n = 0; n < count; n++) {
             const double t = h * r[n];

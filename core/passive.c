@@ -4,8 +4,6 @@
  * The equations of the passive law: see dm_ros/mechanism/passive.py.
  */
 
-#include <math.h>
-
 #include "passive.h"
 
 static const double STRAIGHT = 0.02;
@@ -25,8 +23,8 @@ static double solve(step *job, double q_1, double q_2, const double *state, sign
     const double x_2 = s_2 > 0.0 ? k->phi_2 * t_2 * s_2 : k->psi_2 * t_2 * s_2;
     const double n_1 = k->mean_1 + h_1, n_2 = k->mean_2 + h_2;
     const double p_1 = k->mean_1 - h_1 - x_1, p_2 = k->mean_2 - h_2 - x_2;
-    const double m_1 = dm_quotient(job, k->I_1, p_1), m_2 = dm_quotient(job, k->I_2, p_2);
-    const double r_1 = dm_quotient(job, q_1, p_1), r_2 = dm_quotient(job, q_2, p_2);
+    const double m_1 = quotient(job, k->I_1, p_1), m_2 = quotient(job, k->I_2, p_2);
+    const double r_1 = quotient(job, q_1, p_1), r_2 = quotient(job, q_2, p_2);
     const double F_1 = S_1 * t_1, F_2 = S_2 * t_2;
     const double X = k->l_0 * w - (k->l_1 * k->k_1 - k->l_2 * k->k_2) * s - F_1 - F_2;
     const double beta_0 = k->bearing_0 * fabs(sigma_0);
@@ -44,7 +42,7 @@ static double solve(step *job, double q_1, double q_2, const double *state, sign
         c_F = k->mean_F - h;
         T_3 = T_in * k->g_F * w < 0.0 ? T_in * (1 + beta_3) : T_in;
         T_3 -= (1 + beta_3) * k->l_3 * k->g_F * w;
-        per_torque = dm_quotient(job, k->g_F, a_P * n_F);
+        per_torque = quotient(job, k->g_F, a_P * n_F);
         const double C = a_C * c_F * per_torque;
         inertia = k->I_0 + C * k->I_3 * k->g_F;
         drive = C * T_3;
@@ -61,8 +59,8 @@ static double solve(step *job, double q_1, double q_2, const double *state, sign
     const double R_1 = drive - a_X * X - y_1 * r_1 - y_2 * r_2;
     const double R_2 = z_2 * r_2 - z_1 * r_1 - k->l_s * s;
     const double det = G_11 * G_22 - G_12 * G_21;
-    const double e_0 = dm_quotient(job, R_1 * G_22 - R_2 * G_12, det);
-    const double e_s = dm_quotient(job, G_11 * R_2 - G_21 * R_1, det);
+    const double e_0 = quotient(job, R_1 * G_22 - R_2 * G_12, det);
+    const double e_s = quotient(job, G_11 * R_2 - G_21 * R_1, det);
     const double M_1 = m_1 * (e_0 + k->k_1 * e_s) + r_1;
     const double M_2 = m_2 * (e_0 - k->k_2 * e_s) + r_2;
     const double M_F = per_torque * (T_3 - k->I_3 * k->g_F * e_0);
@@ -109,8 +107,8 @@ static point evaluate(step *job, double w, double s)
     const double k_1s = k->k_1 * s, k_2s = k->k_2 * s;
     const double t_1 = tanh(k->a_1 * s), t_2 = tanh(k->a_2 * s);
     const double state[STATE] = {
-        w, s, tanh(dm_quotient(job, w, k->sign_speed)), tanh(dm_quotient(job, w + k_1s, k->sign_speed)),
-        tanh(dm_quotient(job, w - k_2s, k->sign_speed)), t_1, t_2};
+        w, s, tanh(quotient(job, w, k->sign_speed)), tanh(quotient(job, w + k_1s, k->sign_speed)),
+        tanh(quotient(job, w - k_2s, k->sign_speed)), t_1, t_2};
     const double q_1 = u[S_ONE] * t_1 + k->l_1 * k_1s - u[T_ONE];
     const double q_2 = u[S_TWO] * t_2 - k->l_2 * k_2s - u[T_TWO];
     const double both = q_1 + q_2;
@@ -148,21 +146,21 @@ static slopes jacobian(step *job, const point *at)
     const double n_1 = v[0], n_2 = v[1], p_1 = v[2], p_2 = v[3], y_1 = v[6], y_2 = v[7];
     const double X = v[8], a_N = v[9], a_X = v[10], G_11 = v[12], G_12 = v[13], G_21 = v[14];
     const double G_22 = v[15], det = v[16];
-    const double n_1w = dm_quotient(job, k->half_1 * s_1 * (1 - sigma_1 * sigma_1), k->sign_speed);
-    const double n_2w = dm_quotient(job, k->half_2 * s_2 * (1 - sigma_2 * sigma_2), k->sign_speed);
+    const double n_1w = quotient(job, k->half_1 * s_1 * (1 - sigma_1 * sigma_1), k->sign_speed);
+    const double n_2w = quotient(job, k->half_2 * s_2 * (1 - sigma_2 * sigma_2), k->sign_speed);
     const double n_1s = n_1w * k->k_1, n_2s = -n_2w * k->k_2;
     const double u_1 = k->a_1 * (1 - t_1 * t_1), u_2 = k->a_2 * (1 - t_2 * t_2);
     const double phi_1 = s_1 > 0.0 ? k->phi_1 : k->psi_1, phi_2 = s_2 > 0.0 ? k->phi_2 : k->psi_2;
     const double x_1s = phi_1 * s_1 * u_1, x_2s = phi_2 * s_2 * u_2;
     const double q_1s = k->l_1 * k->k_1 + S_1 * u_1, q_2s = S_2 * u_2 - k->l_2 * k->k_2;
-    const double M_1w = dm_quotient(job, M_1 * n_1w, p_1);
-    const double M_1s = dm_quotient(job, q_1s + M_1 * (n_1s + x_1s), p_1);
-    const double M_2w = dm_quotient(job, M_2 * n_2w, p_2);
-    const double M_2s = dm_quotient(job, q_2s + M_2 * (n_2s + x_2s), p_2);
+    const double M_1w = quotient(job, M_1 * n_1w, p_1);
+    const double M_1s = quotient(job, q_1s + M_1 * (n_1s + x_1s), p_1);
+    const double M_2w = quotient(job, M_2 * n_2w, p_2);
+    const double M_2s = quotient(job, q_2s + M_2 * (n_2s + x_2s), p_2);
     double g_w = (M_1 * a_N * n_1w + y_1 * M_1w + M_2 * a_N * n_2w + y_2 * M_2w + a_X * k->l_0);
     const double g_s = (M_1 * (a_N * n_1s - a_X * x_1s) + y_1 * M_1s
                         + M_2 * (a_N * n_2s - a_X * x_2s) + y_2 * M_2s - a_X * (q_1s + q_2s));
-    const double sigma_w = dm_quotient(job, 1 - sigma_0 * sigma_0, k->sign_speed);
+    const double sigma_w = quotient(job, 1 - sigma_0 * sigma_0, k->sign_speed);
     if (k->g_F != 0.0 || sigma_w != 0.0) {
         const double side = w < 0.0 ? -1.0 : 1.0;
         const double beta_w = k->bearing_0 * side * sigma_w * b;
@@ -181,8 +179,8 @@ static slopes jacobian(step *job, const point *at)
             double T_3w = -k->l_3 * k->g_F * (1 + beta_3 + beta_3w * w);
             if (T_in * k->g_F * w < 0.0)
                 T_3w += T_in * beta_3w;
-            const double M_Fw = (dm_quotient(job, k->g_F, a_P * n_F) * T_3w
-                                 - M_F * (dm_quotient(job, a_Pw, a_P) + dm_quotient(job, n_Fw, n_F)));
+            const double M_Fw = (quotient(job, k->g_F, a_P * n_F) * T_3w
+                                 - M_F * (quotient(job, a_Pw, a_P) + quotient(job, n_Fw, n_F)));
             g_w -= a_Cw * c_F * M_F + a_C * (c_F * M_Fw - n_Fw * M_F);
         } else if (T_in * w < 0.0) {
             g_w -= beta_w * T_in;
@@ -190,10 +188,10 @@ static slopes jacobian(step *job, const point *at)
     }
     const double r_w = k->g_12 * (n_1w * M_1 + n_1 * M_1w) - n_2w * M_2 - n_2 * M_2w;
     const double r_s = k->g_12 * (n_1s * M_1 + n_1 * M_1s) - n_2s * M_2 - n_2 * M_2s + k->l_s;
-    return (slopes){{dm_quotient(job, G_12 * r_w - G_22 * g_w, det),
-                     dm_quotient(job, G_12 * r_s - G_22 * g_s, det),
-                     dm_quotient(job, G_21 * g_w - G_11 * r_w, det),
-                     dm_quotient(job, G_21 * g_s - G_11 * r_s, det)}, {0.0}};
+    return (slopes){{quotient(job, G_12 * r_w - G_22 * g_w, det),
+                     quotient(job, G_12 * r_s - G_22 * g_s, det),
+                     quotient(job, G_21 * g_w - G_11 * r_w, det),
+                     quotient(job, G_21 * g_s - G_11 * r_s, det)}, {0.0}};
 }
 
 static int bends(const step *job, const point *here, const point *there)
@@ -287,8 +285,8 @@ static int newton(step *job, pair y, double h, pair *end)
         const double r_w = w - y.w - h * at.e_0, r_s = s - y.s - h * at.e_s;
         const double a = 1 - h * J.ww, b = -h * J.ws, c = -h * J.sw, d = 1 - h * J.ss;
         const double det = a * d - b * c;
-        const double d_w = dm_quotient(job, d * r_w - b * r_s, det);
-        const double d_s = dm_quotient(job, a * r_s - c * r_w, det);
+        const double d_w = quotient(job, d * r_w - b * r_s, det);
+        const double d_s = quotient(job, a * r_s - c * r_w, det);
         if (job->broken)
             return 0;
         w = w - d_w;

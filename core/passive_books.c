@@ -4,8 +4,6 @@
  * The books of a step under the passive law: see PassiveMeter in dm_ros/motion/meters.py.
  */
 
-#include <math.h>
-
 #include "exponentials.h"
 #include "passive.h"
 #include "quadrature.h"

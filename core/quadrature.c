@@ -4,8 +4,6 @@
  * Integrals along the path of a step: see dm_ros/motion/quadrature.py.
  */
 
-#include <math.h>
-
 #include "quadrature.h"
 
 static const double STIFF = 1.5, FINE = 0.4;

@@ -4,8 +4,6 @@
  * Roots of functions of one number: see dm_ros/motion/roots.py, and root in adaptive.py.
  */
 
-#include <math.h>
-
 #include "core.h"
 
 static const double XTOL = 1e-12, RTOL = 1.0 / 1125899906842624.0;   /* 2^-50 */
@@ -57,8 +55,8 @@ static int bracketed_root(const context *f, double start, double end, double *fo
                 up = -f_at * (at - before);
                 down = f_at - f_before;
             } else {
-                const double d_before = dm_quotient(f->job, f_before - f_at, before - at);
-                const double d_across = dm_quotient(f->job, f_across - f_at, across - at);
+                const double d_before = quotient(f->job, f_before - f_at, before - at);
+                const double d_across = quotient(f->job, f_across - f_at, across - at);
                 up = -f_at * (f_across * d_across - f_before * d_before);
                 down = d_across * d_before * (f_across - f_before);
             }
