@@ -5,6 +5,7 @@
 
 from itertools import pairwise
 from pathlib import Path
+import re
 import shutil
 
 import numpy as np
@@ -100,11 +101,43 @@ def stamp(message):
 
 
 @pytest.mark.parametrize('case', CASES)
-def test_a_drive_from_a_bag_gives_the_same_bits(case):
+def test_a_drive_from_a_bag_gives_the_same_bits(case, capsys):
     arguments = recorded(case)
     for bag in ('drive', 'drive/drive.mcap'):
+        capsys.readouterr()
         assert simulate(*arguments, '--torques', bag, '--out', 'AGAIN.csv') == 0
         assert Path('AGAIN.csv').read_bytes() == Path('OUT.csv').read_bytes()
+        assert 'all speeds are those of the recording, bit by bit' in capsys.readouterr().err
+
+
+def test_how_far_a_run_is_from_the_recording_is_told(capsys):
+    recorded('lsd_ode')
+    assert simulate('--variant', 'lsd_ode', '--loss-law', 'paper', '--torques', 'drive',
+                    '--out', 'AGAIN.csv') == 0
+    told = capsys.readouterr().err.splitlines()[-1]
+    away, when = map(float, re.fullmatch(
+        r'simulate: speeds are up to (\S+) rad/s from those of the recording, at (\S+) s',
+        told).groups())
+    whole, again = (np.genfromtxt(name, delimiter=',', names=True)
+                    for name in ('OUT.csv', 'AGAIN.csv'))
+    differences = np.max([abs(whole[name] - again[name]) for name in whole.dtype.names
+                          if name.startswith('velocity')], axis=0)
+    assert away == pytest.approx(differences.max(), rel=5e-3) and away > 1e-3
+    assert when == pytest.approx(whole['time'][differences.argmax()])
+    assert simulate('--variant', 'lsd_ode', '--torques', 'drive', '--dt', '0.0005',
+                    '--out', 'AGAIN.csv') == 0
+    assert 'recording' not in capsys.readouterr().err   # other ticks
+
+
+def test_what_a_run_needs_and_a_bag_lacks_is_told(capsys):
+    recorded('lsd_ode')
+    cut('drive', 'bare', lambda stamp: True, topics=('joint_states',))
+    run = ['--variant', 'lsd_ode', '--torques', 'bare', '--out', 'AGAIN.csv']
+    assert simulate(*run) == 0
+    assert 'without /differential/clutches no force is taken' in capsys.readouterr().err
+    Path('params.yaml').write_text('/**: {ros__parameters: {port.rear.kind: speed}}')
+    assert refusal(capsys, *run, '--params', 'params.yaml') == (
+        'bare: no speed of rear, where one comes in, is in it')
 
 
 def test_speed_ports_replay_what_was_commanded_and_never_the_effort():
@@ -154,22 +187,23 @@ def test_missing_ticks_are_told_and_have_the_torque_of_the_next(capsys):
     assert len(set(again['torquecarrier'][51:55])) == 1
 
 
-def cut(source, target, kept, changed=lambda message: None, clock=lambda time: time):
-    """Copy a bag with those messages alone whose stamps are to be kept, and what else is asked."""
+def cut(source, target, kept, clock=lambda time: time, topics=None):
+    """Copy those messages of a bag whose stamps are to be kept, at times of another clock."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import get_typestore, Stores
-    types, topics = get_typestore(Stores.ROS2_JAZZY), {}
+    types, copies = get_typestore(Stores.ROS2_JAZZY), {}
     with AnyReader([Path(source)]) as reader, Bag(target) as bag:
         for connection, time, data in reader.messages():
             message = types.deserialize_cdr(data, connection.msgtype)
-            if not hasattr(message, 'header') or not kept(stamp(message)):
+            name = connection.topic.rpartition('/')[2]
+            if not hasattr(message, 'header') or not kept(stamp(message)) or (
+                    topics and name not in topics):
                 continue
-            changed(message)
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(
                 clock(stamp(message)), 10**9)
-            if connection.topic not in topics:
-                topics[connection.topic] = bag.topic(connection.topic, connection.msgtype)
-            bag.write(topics[connection.topic], clock(time),
+            if connection.topic not in copies:
+                copies[connection.topic] = bag.topic(connection.topic, connection.msgtype)
+            bag.write(copies[connection.topic], clock(time),
                       types.serialize_cdr(message, connection.msgtype))
 
 

@@ -34,6 +34,7 @@ class RecordedDrive(NamedTuple):
     dt: float       # s, of a tick of the node that was recorded
     values: dict    # parameters that a run of it needs: the speeds at the start, and no lag
     remarks: tuple  # lines for who wants to run it
+    speeds: dict    # rad/s, of all shafts after the nth tick of that length, as recorded
 
 
 def is_bag(path):
@@ -164,6 +165,8 @@ class _Drive:
         if not simulated:
             ends = range(len(stamps))
         remarks = [_remark(stamps, ends, rate, simulated)]
+        if self._mechanism.actuators and not self.forces and not self._presses():
+            remarks.append(f'without {self.node}/clutches no force is taken to be on them')
         values = {}
         if simulated and ends[0] == 1:   # the start was not published
             ends, messages = [0, *ends], [None, *messages]
@@ -187,8 +190,10 @@ class _Drive:
             table = self._mechanism.parameters
             values |= {f'{table.prefix}.clutch.{clutch}.actuator_time_constant': 0.0
                        for clutch in self._mechanism.clutches}
+        speeds = {end - ends[0]: tuple(message.velocity.tolist())
+                  for end, message in zip(ends[1:], messages[1:])}
         return RecordedDrive(self._table(times, rows), 1 / rate, values,
-                             tuple(filter(None, remarks)))
+                             tuple(filter(None, remarks)), speeds)
 
     def _start(self, message):
         speeds = dict(zip(self._mechanism.shafts, message.velocity))
@@ -203,6 +208,12 @@ class _Drive:
             raise ValueError(f'{self.node}/clutches lacks a message with the stamp '
                              f'{_stamp(message) * 1e-9:.9f} s of joint_states')
         return tuple(map(float, forces))
+
+    def _presses(self):
+        """Return whether any command was for a clutch."""
+        clutches = {self._prefix + actuator.name for actuator in self._mechanism.actuators}
+        return any(topic.startswith('clutch/') or topic == 'torques' and clutches.intersection(
+            message.name) for _, _, topic, message in self.commands)
 
     def _commanded(self, count, simulated, rate, timeout):
         """Return what was commanded in each tick; None where nothing needs it."""
@@ -242,7 +253,7 @@ class _Drive:
         return RecordedDrive(
             self._table([(time - times[0]) * 1e-9 for time in times], self._plain(held, rows)),
             1 / rate, {},
-            (f'without {self.node}/joint_states what was commanded is taken, when it came',))
+            (f'without {self.node}/joint_states what was commanded is taken, when it came',), {})
 
     def _held(self, timeout):
         ports = self._mechanism.ports + self._mechanism.actuators
@@ -262,6 +273,8 @@ class _Drive:
     def _plain(self, held, rows):
         """Return the rows as those of a table: without forces, where none ever came."""
         silent, count = held.silent(), len(self._mechanism.ports)
+        if free := [shaft for shaft in self._mechanism.half_shafts if shaft in silent]:
+            raise ValueError(f'no speed of {", ".join(free)}, where one comes in, is in it')
         if all(actuator.name in silent for actuator in self._mechanism.actuators):
             rows = [row[:count] for row in rows]
         return [tuple(None if value is None else float(value) for value in row) for row in rows]

@@ -46,12 +46,12 @@ outside in rad/s; before the first row the shaft is free.
 
 OUT.csv has the columns time, velocity.<shaft> (rad/s), position.<shaft> (rad), torque.<input>
 (N m), moment.<name> (N m), power_flow (+1 direct, -1 reverse), clutch_force.<clutch> (N): a row
-for the start, then one for the end of each tick. Without --out and --plot it goes to stdout.
+for the start, then one for the end of each tick. Without --out, --plot, --bag it goes to stdout.
 
 IN may be a bag instead, a folder or an .mcap file: the torques and forces that were in force in
 each tick, from ~/joint_states and ~/clutches, and the speeds outside that were commanded. What was
-recorded in lockstep gives the same bits again. The tick is that of the recording, unless --dt says
-more.
+recorded in lockstep gives the same bits again. The tick is that of the recording, or S. In the end
+it is told how far the speeds are from those of the recording.
 
 --bag FOLDER makes a bag of the run, with the topics, stamps and quality of service of a node
 /differential in lockstep, what it was commanded among them.
@@ -128,7 +128,28 @@ def written_as_csv(arguments):
     return arguments.out or not (arguments.plot or arguments.bag)
 
 
-def rows_of(simulation, torques, bag=None):
+class Comparison:
+    """How far a run is from the one that was recorded."""
+
+    def __init__(self, speeds):
+        """:param speeds: those of a ``RecordedDrive``."""
+        self._speeds, self._largest = speeds, (0.0, 0.0)   # rad/s, and when, s
+
+    def __str__(self):
+        if self._largest[0] == 0.0:
+            return 'all speeds are those of the recording, bit by bit'
+        return 'speeds are up to {:.3g} rad/s from those of the recording, at {:.6g} s'.format(
+            *self._largest)
+
+    def note(self, tick, snapshot):
+        """Take the end of a tick."""
+        recorded = self._speeds.get(tick, snapshot.velocity)
+        if recorded != snapshot.velocity:
+            away = max(abs(a - b) for a, b in zip(recorded, snapshot.velocity))
+            self._largest = max(self._largest, (away, snapshot.time))
+
+
+def rows_of(simulation, torques, bag=None, comparison=None):
     """Run a simulation; yield the start and the end of each tick as rows of a record."""
     snapshot = simulation.snapshot()
     if bag:
@@ -139,6 +160,8 @@ def rows_of(simulation, torques, bag=None):
         snapshot = simulation.step(row[:count], row[count:] or NO_FORCE)
         if bag:
             bag.tick(row, snapshot)
+        if comparison:
+            comparison.note(simulation.ticks, snapshot)
         yield as_row(snapshot)
 
 
@@ -150,7 +173,7 @@ def kept(rows, numbers):
 
 
 def loaded(arguments, variant, values):
-    """Return a simulation and the table of the torques for it."""
+    """Return a simulation, its ``TorqueTable``, and its ``Comparison`` or None."""
     is_auto = arguments.dt == 'auto'
     simulation = make_simulation(variant, values, None if is_auto else arguments.dt)
     mechanism = simulation.mechanism
@@ -164,7 +187,8 @@ def loaded(arguments, variant, values):
         for line in drive.remarks:
             print(f'simulate: {arguments.torques}: {line}', file=sys.stderr)
         dt = drive.dt if is_auto or arguments.dt is None else arguments.dt
-        return make_simulation(variant, values | drive.values, dt), drive.table
+        return (make_simulation(variant, values | drive.values, dt), drive.table,
+                Comparison(drive.speeds) if drive.speeds and dt == drive.dt else None)
     if arguments.node:
         raise ValueError('--node: only a bag has nodes')
     table = read_torque_file(arguments.torques, mechanism.ports, mechanism.clutch_moments,
@@ -175,7 +199,7 @@ def loaded(arguments, variant, values):
         except ValueError as error:
             raise ValueError(f'{arguments.torques}: {error}') from None
         simulation = make_simulation(variant, values, dt)
-    return simulation, table
+    return simulation, table, None
 
 
 def run(arguments):
@@ -192,7 +216,7 @@ def run(arguments):
     variant = arguments.variant or values.get('variant')
     if variant is None:
         raise ValueError('--variant: it is needed where no FILE has the parameter variant')
-    simulation, table = loaded(arguments, variant, values)
+    simulation, table, comparison = loaded(arguments, variant, values)
     try:
         torques = table.held(simulation.dt)
     except ValueError as error:
@@ -202,7 +226,8 @@ def run(arguments):
         bag = arguments.bag and stack.enter_context(TickBag(
             arguments.bag, simulation.mechanism, 1 / simulation.dt,
             NodeParameters().changed(NodeParameters.part_of(values)).joint_prefix))
-        file, rows, numbers = None, rows_of(simulation, torques, bag), array('d')
+        file, rows, numbers = None, rows_of(
+            simulation, torques, bag, comparison), array('d')
         if arguments.plot:
             picture = stack.enter_context(replacing(arguments.plot, 'wb'))
             rows = kept(rows, numbers)
@@ -224,6 +249,8 @@ def run(arguments):
     speeds = zip(simulation.shafts, simulation.snapshot().velocity, strict=True)
     print(f'simulate: {len(torques)} ticks, {simulation.time:.6g} s, final speeds in rad/s:',
           ', '.join(f'{shaft} {speed:.6g}' for shaft, speed in speeds), file=sys.stderr)
+    if comparison:
+        print('simulate:', comparison, file=sys.stderr)
 
 
 def main(args=None):
