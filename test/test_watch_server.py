@@ -254,6 +254,18 @@ def test_commands_stay_until_the_last_viewer_who_gave_any_leaves(controlled, loo
     until(lambda: controlled.commands.values == {})
 
 
+def test_no_command_stays_of_a_viewer_who_leaves_while_it_is_taken(controlled, look):
+    stream, command = look(controlled), controlled.command
+
+    def slow(viewer, request):
+        stream.close()
+        until(lambda: len(controlled.viewers) == 0)
+        return command(viewer, request)
+    controlled.command = slow
+    assert request(controlled, stream)[0] == 200
+    assert controlled.commands.values == {}
+
+
 @pytest.mark.parametrize('token', ['', 'x', 'é'])
 def test_a_command_needs_the_token_of_the_page(controlled, look, token):
     stream = look(controlled)

@@ -171,7 +171,11 @@ class Handler(BaseHTTPRequestHandler):
         viewer = request.get('viewer')
         if not server.viewers.knows(viewer):
             raise Refused(409, '"viewer" must be the one that the stream of events named')
-        return server.command(viewer, request)
+        try:
+            return server.command(viewer, request)
+        finally:
+            if not server.viewers.knows(viewer):   # it has left meanwhile
+                server.viewers.on_leave(viewer)
 
     def body(self):
         """Return the body, None where it is too long or its length is not told."""
