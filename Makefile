@@ -22,7 +22,7 @@ EXTRAS = ros,bag,test
 BASE := $(shell $(PYTHON) -c 'import sys; print(sys._base_executable)')
 ROS := $(shell $(BASE) -c 'import rclpy' 2>/dev/null && echo ros || echo pypi)
 
-PACKAGING := Makefile package.xml setup.cfg setup.py
+PACKAGING := Makefile package.xml setup.cfg setup.py $(wildcard core/*.c core/*.h)
 # pip writes console scripts to bin/ whatever setup.cfg says, if it builds by PEP 517.
 PIP_INSTALL := bin/pip install --quiet --use-pep517
 
@@ -128,10 +128,10 @@ colcon: .venv/colcon  ## build the package with colcon, check what it installs, 
 	  install/dm_ros/lib/dm_ros/differential --ros-args -p variant:=lsd_ode -p rate:=500.0 \
 	  --params-file install/dm_ros/share/dm_ros/config/lsd.yaml
 
-test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's numpy and scipy
-	env -u PYTHONPATH MPLBACKEND=Agg .venv-jazzy/bin/python -m pytest $(PARALLEL) --ignore=test/ros \
-	  $(PYTEST_ARGS)
+test-jazzy-versions: .venv-jazzy/done  ## run the tests without ROS on Jazzy's numpy and scipy, all steps in Python
+	env -u PYTHONPATH MPLBACKEND=Agg DM_ROS_CORE=python .venv-jazzy/bin/python -m pytest $(PARALLEL) \
+	  --ignore=test/ros $(PYTEST_ARGS)
 
 clean:  ## remove all that the other targets make
 	rm -rf .venv .venv-* build install log run comparison docs_build docs_output cross_reference \
-	  *.egg-info .hypothesis .pytest_cache .ruff_cache
+	  dm_ros/_core.abi3.so *.egg-info .hypothesis .pytest_cache .ruff_cache

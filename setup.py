@@ -4,7 +4,7 @@
 from glob import glob
 from xml.etree import ElementTree
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
 
 PACKAGE = ElementTree.parse('package.xml').getroot()
 NAME = PACKAGE.findtext('name')
@@ -28,6 +28,10 @@ setup(
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
     ],
     package_data={NAME: ['ros/*.xml', 'watch/web/*', 'watch/web/uplot/*']},
+    ext_modules=[Extension(   # never required: without a compiler Python does it all
+        f'{NAME}._core', sorted(glob('core/*.c')), depends=glob('core/*.h'), optional=True,
+        py_limited_api=True, extra_compile_args=[   # equal bits: no fused multiply-add
+            '-std=c99', '-O2', '-ffp-contract=off', '-fvisibility=hidden'])],
     zip_safe=False,   # Fast DDS reads localhost.xml itself
     python_requires='>=3.11',
     install_requires=['numpy>=1.26', 'scipy>=1.11', 'PyYAML', 'tqdm'],

@@ -15,6 +15,7 @@ import os
 import platform
 from time import perf_counter
 from typing import Callable, NamedTuple
+from unittest import mock
 
 import numpy as np
 import peers
@@ -27,7 +28,7 @@ from reference import (
     trajectory_of,
 )
 
-from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters
+from dm_ros import core, SelfLockingParameters, Simulation, SymmetricParameters
 from dm_ros.energy import AuditedSimulation
 from dm_ros.mechanism.variants import CATALOGUE, MECHANISMS, SYMMETRIC
 from dm_ros.motion.models import PAPER, PASSIVE
@@ -59,6 +60,7 @@ the exact solution under held torques.
 
 - step: `Simulation.step`, with the snapshot. bare: `Simulation.advance`, without. With books:
   `AuditedSimulation.step`, which tells where the energy of the tick went.
+- in Python: without the core in C, which makes the adaptive steps where it is built.
 - passive, paper: the law of losses; where none is named, it is the paper's.
 - lossless: the numpy pair and MuJoCo know no efficiencies; in their yardstick all are 1.
 - numpy matvec pair: Phi x + Gamma u and no more, without the index of power flow.
@@ -114,6 +116,12 @@ class Ours:
         return trajectory_of(self.simulation, rows).speeds
 
 
+def in_python(kind, variant, law):
+    """Return a simulation whose steps are not made in C."""
+    with mock.patch.multiple(core, **dict.fromkeys(core.STEPS)):
+        return kind(variant, DT, loss_law=law)
+
+
 def all_rows():
     """Return the rows of the cost table."""
     p, q = SymmetricParameters(), SelfLockingParameters()
@@ -128,6 +136,13 @@ def all_rows():
                     f'{name if name == "lsd_lagged" else mechanism} {law}',
                     lambda v=name, w=law, m=method, k=kind: Ours(k(v, DT, loss_law=w), m),
                     per_tick=method == 'step'))
+    for kind, word in ((Simulation, 'step'), (AuditedSimulation, 'step with books')):
+        for law, name in (('paper', 'lsd_ode'), ('passive', 'symmetric_ode'),
+                          ('passive', 'lsd_ode')):
+            mechanism = CATALOGUE[name].mechanism.name
+            rows.append(Row(
+                f'{name} {law}, {word}, in Python', mechanism, f'{mechanism} {law}',
+                lambda v=name, w=law, k=kind: Ours(in_python(k, v, w), 'step'), per_tick=True))
     rows.append(Row('symmetric: numpy matvec pair, lossless', 'symmetric', 'symmetric lossless',
                     lambda: MatrixPair(p, DT)))
     rows.append(Row('symmetric: python-control, discrete', 'symmetric', 'symmetric paper',

@@ -8,12 +8,14 @@ What a differential keeps to whatever is asked of it, checked shortly and, in ``
                  many powers of ten, a random rate, start and load; case n is always the same
 ``check_state``  one random state under the passive law
 ``endure``       one load for a long time at 100 Hz
+``Twins``        random cases by the core in C and by Python
 """
 
 import dataclasses
 import itertools
 import math
 from typing import NamedTuple
+from unittest import mock
 
 from mechanisms import (
     form,
@@ -30,13 +32,14 @@ from mechanisms import (
 )
 import numpy as np
 
-from dm_ros import SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
+from dm_ros import core, SelfLockingParameters, Simulation, SymmetricParameters, VARIANTS
 from dm_ros.mechanism import clutched, passive, self_locking, symmetric
 from dm_ros.mechanism.self_locking import SelfLockingDae
 from dm_ros.mechanism.symmetric import SymmetricDae
 from dm_ros.mechanism.variants import SYMMETRIC, variant_named, variants_of
 from dm_ros.motion.energy import AuditedSimulation
 from dm_ros.motion.models import PAPER, PASSIVE
+from dm_ros.motion.simulation import NO_FORCE
 
 ROUNDING = 1e-14     # of the largest term of a constraint
 TORQUE_LIMIT = 1e5   # N m
@@ -441,3 +444,50 @@ def endure(variant, kind, settle, periods, loss_law=PASSIVE):
     error = float(np.abs(turned - turn * (periods - settle)).max()) / (largest or 1.0)
     return Endured(simulation.ticks, now.time, max(map(abs, now.velocity)), largest, residual,
                    error, simulation.coarse_steps)
+
+
+# In C and in Python
+
+
+class Twins:
+    """Random cases by C and by Python: equal to the last bit."""
+
+    def __init__(self, loss_law, clutched=False):
+        self.loss_law, self.clutched = loss_law, clutched
+        self.cases = self.ticks = self.coarse_steps = self.refused = 0
+
+    def __str__(self):
+        which = 'symmetric with clutches' if self.clutched else 'all variants'
+        return (f'{self.loss_law}, {which}: {self.cases} cases, {self.ticks} ticks, '
+                f'{self.coarse_steps} coarse '
+                f'steps, {self.refused} ticks refused, equal bits')
+
+    def run(self, n):
+        """Run case n both ways; raise AssertionError, with the case, where they differ."""
+        rng, case = np.random.default_rng([6, n]), random_case(n, self.clutched)
+        p = dataclasses.replace(case.arguments['parameters'], sign_speed=power_of_ten(rng, -3, 2))
+        arguments = {**case.arguments, 'parameters': p, 'loss_law': self.loss_law}
+        forces = rng.uniform(0.0, 1e4, (len(case.load), 2)) * rng.integers(2)
+        ways = []
+        for functions in ({name: getattr(core, name) for name in core.STEPS},
+                          dict.fromkeys(core.STEPS)):
+            with mock.patch.multiple(core, **functions):
+                ways.append(self._way(case.variant, arguments, case.load, forces.tolist()))
+        assert ways[0] == ways[1], f'case {n}: {case}'
+        self.cases += 1
+
+    def _way(self, variant, arguments, load, forces):
+        """Return all that a run reports, as bytes."""
+        audit, found = AuditedSimulation(variant, **arguments), []
+        for torque, force in zip(load, forces):
+            try:
+                snapshot = audit.step(torque, force if audit.clutches else NO_FORCE)
+            except ValueError as error:
+                found.append(str(error))
+                self.refused += 1
+                continue
+            numbers = np.hstack([*snapshot, audit.coarse_steps, *snapshot.energy.entries])
+            found.append(numbers.tobytes())
+        self.ticks += audit.ticks
+        self.coarse_steps += audit.coarse_steps
+        return found

@@ -24,10 +24,9 @@ All works in plain floats: on 2x2 systems that is several times faster than arra
 
 from typing import Callable, NamedTuple
 
-from scipy.optimize import brentq
-
 from dm_ros.mechanism import clutched, passive
 from dm_ros.motion.exponentials import apply_phi_2
+from dm_ros.motion.roots import bracketed_root
 
 TOLERANCE = 1e-4        # rad/s, error estimate allowed in one part
 BACKWARD = 3.0          # times that, for the estimate seen from the end
@@ -90,10 +89,7 @@ def root(residual, start, guess):
         return start
     for _ in range(60):
         if residual(start + guess) * guess >= 0.0:
-            try:
-                return brentq(residual, start, start + guess, xtol=1e-12, maxiter=200, disp=False)
-            except ValueError:   # beyond the range of floating point numbers
-                return None
+            return bracketed_root(residual, start, start + guess)
         guess *= 2.0
     return start if start + guess == start else None   # nearer than numbers are
 

@@ -37,6 +37,8 @@ class CoupledModel:
     its twist zero.
     """
 
+    language = 'Python'   # of its steps
+
     def __init__(self, formulation, mechanism, loss_law, parameters, h, ports):
         self.parameters, self.h = parameters, h
         self.mechanism = mechanism

@@ -3,13 +3,14 @@
 
 """Exponentials of small matrices, in which linear equations are exact."""
 
-import cmath
 import math
 
 import numpy as np
 from scipy.linalg import expm
 
 STEEPEST = 300.0   # growth beyond e to that is refused, but where all rests
+SMALL = 0.02       # number whose phi is that of a short series
+APART = 1e-4       # half the difference of eigenvalues, from which on they are two
 
 
 def held_propagator(A, B, h):
@@ -67,28 +68,43 @@ def phi_matrices(Z):
 
 
 def phi_2(z):
-    """Return (e^z - 1 - z)/z^2 of a real or complex number."""
-    if abs(z) < 0.02:
+    """Return (e^z - 1 - z)/z^2."""
+    if abs(z) < SMALL:
         return 1 / 2 + z * (1 / 6 + z * (1 / 24 + z * (1 / 120 + z * (1 / 720 + z / 5040))))
-    if isinstance(z, complex):
-        return (cmath.exp(z) - 1 - z) / (z * z)
     return (math.expm1(min(z, STEEPEST)) - z) / (z * z)
+
+
+def complex_phi_2(a, b):
+    """Return the same of a + ib, b > 0, as a real and an imaginary part."""
+    if abs(a) + b < SMALL:
+        p, q = 1 / 720 + a / 5040, b / 5040
+        for start in (1 / 120, 1 / 24, 1 / 6, 1 / 2):
+            p, q = start + (a * p - b * q), a * q + b * p
+        return p, q
+    growth = math.exp(min(a, STEEPEST))
+    p, q = growth * math.cos(b) - 1.0 - a, growth * math.sin(b) - b
+    c, d = a * a - b * b, 2.0 * a * b   # z^2
+    size = c * c + d * d
+    return (p * c + q * d) / size, (q * c - p * d) / size
 
 
 def apply_phi_2(z11, z12, z21, z22, v1, v2):
     """Return the vector phi_2(Z) v for a 2x2 matrix Z, by interpolation at its eigenvalues."""
     mean, half = (z11 + z22) / 2, (z11 - z22) / 2
     square = half * half + z12 * z21
-    root = math.sqrt(square) if square >= 0.0 else 1j * math.sqrt(-square)
-    high, low = mean + root, mean - root
-    value = phi_2(high)
-    if abs(root) > 1e-4:
-        slope = (value - phi_2(low)) / (2 * root)
-    else:   # the two meet: the derivative, to O(root^2), by a difference wide enough
+    root = math.sqrt(abs(square))
+    if square < 0.0:   # mean +- i root: what is imaginary cancels
+        center = mean
+        value, turning = complex_phi_2(mean, root)
+        slope = turning / root
+    else:
+        center = mean + root
+        value, low = phi_2(center), mean - root
+        slope = (value - phi_2(low)) / (2 * root) if root > APART else 0.0
+    if not root > APART:   # the two meet: the derivative, to O(root^2), by a wide difference
         slope = (phi_2(mean + 1e-3) - phi_2(mean - 1e-3)) / 2e-3
-    w1 = value * v1 + slope * ((z11 - high) * v1 + z12 * v2)
-    w2 = value * v2 + slope * (z21 * v1 + (z22 - high) * v2)
-    return (w1, w2) if square >= 0.0 else (w1.real, w2.real)
+    return (value * v1 + slope * ((z11 - center) * v1 + z12 * v2),
+            value * v2 + slope * (z21 * v1 + (z22 - center) * v2))
 
 
 def way(J, f, h, nodes):

@@ -17,11 +17,17 @@ from operator import add, mul
 
 import numpy as np
 
-from dm_ros.mechanism import losses, passive, self_locking, symmetric
+from dm_ros.mechanism import losses, passive, symmetric
 from dm_ros.mechanism.clutched import evaluate
+from dm_ros.mechanism.kinetic import (
+    energy_gained,
+    kinetic_energy,
+    symmetric_form,
+)
 from dm_ros.mechanism.symmetric import TO_SLIP
 from dm_ros.motion.exponentials import way
 from dm_ros.motion.models import (
+    Booked,
     ClutchedModel,
     ClutchedSymmetricModel,
     PassiveModel,
@@ -30,41 +36,6 @@ from dm_ros.motion.models import (
 )
 from dm_ros.motion.patterns import Pattern
 from dm_ros.motion.quadrature import rule_for, second_moment_of_the_way
-
-
-def kinetic_form(inertias, shafts):
-    """Return (m_11, m_12, m_22): kinetic energy is (m_11 x_1^2 + m_22 x_2^2)/2 + m_12 x_1 x_2."""
-    m = shafts.T @ (np.array(inertias)[:, None] * shafts)
-    return float(m[0, 0]), float(m[0, 1]), float(m[1, 1])
-
-
-def symmetric_form(p):
-    """Return the form of the kinetic energy of a symmetric differential in (w, s)."""
-    return kinetic_form((p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s),
-                        symmetric.kinematics(p) @ np.linalg.inv(TO_SLIP))
-
-
-def self_locking_form(p):
-    """Return the form of the kinetic energy of a self-locking differential in (w, s)."""
-    return kinetic_form(
-        (p.I_0, p.I_1, p.I_2, p.n_s * p.I_s),
-        self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p)))
-
-
-def kinetic_energy(m, x):
-    """Return the kinetic energy at the speeds x, J."""
-    m_11, m_12, m_22 = m
-    x_1, x_2 = x
-    return (m_11 * x_1 * x_1 + m_22 * x_2 * x_2) / 2 + m_12 * x_1 * x_2
-
-
-def energy_gained(m, start, end):
-    """Return the difference of the kinetic energies, J, exact also where it is small."""
-    m_11, m_12, m_22 = m
-    (x_1, x_2), (y_1, y_2) = start, end
-    s_1, s_2 = y_1 + x_1, y_2 + x_2
-    return ((y_1 - x_1) * (m_11 * s_1 + m_12 * s_2)
-            + (y_2 - x_2) * (m_12 * s_1 + m_22 * s_2)) / 2
 
 
 def leads_far(w, s, d_w, d_s):
@@ -148,12 +119,10 @@ class ClutchedMeter:
     CALM = 4e-6   # rad/s of c: with less, the remainder is some hundredth of the step's tolerance
 
     def __init__(self, model):
-        p = model.parameters
-        self.form = self_locking_form(p)
+        p, self.form, self._losses = model.parameters, model.form, model.losses
         self._k_1, self._k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
         self._input_ratio = 1.0   # of the input shaft to the carrier
         self._coefficients = model.coefficients
-        self._losses = {d: losses.self_locking_losses(p, d) for d in model.responses}
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
@@ -172,15 +141,18 @@ class ClutchedMeter:
 
     def book(self, step, T):
         """Return the energies of a step, see the module."""
-        x, direction, end, integral, _, _, (u, parts) = step
+        x, direction, end, integral, _, _, path = step
+        lost, numerical = path if type(path) is Booked else self._booked(direction, T, *path)
+        work = map(mul, T, self.angles(integral))
+        return *work, energy_gained(self.form, x, end), *lost, numerical
+
+    def _booked(self, direction, T, u, parts):
         first, *others = parts
         lost, numerical = self._part(direction, u, T, first)
         for part in others:
             more, taken = self._part(direction, u, T, part)
-            lost = tuple(map(add, lost, more))
-            numerical += taken
-        work = map(mul, T, self.angles(integral))
-        return *work, energy_gained(self.form, x, end), *lost, numerical
+            lost, numerical = tuple(map(add, lost, more)), numerical + taken
+        return Booked(lost, numerical)
 
     def _part(self, direction, u, T, part):
         """Return what the elements lost in a part of the path, and what its error took."""
@@ -277,10 +249,8 @@ class ClutchedSymmetricMeter(ClutchedMeter):
 
     def __init__(self, model):
         super().__init__(model)
-        p = model.parameters
-        self.form, self._input_ratio = symmetric_form(p), p.g_F
+        self._input_ratio = model.parameters.g_F
         self._final_drives = model.final_drives
-        self._losses = {d: losses.symmetric_losses(p, d) for d in model.responses}
 
     def _lost(self, direction, T, a_w, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, *meshes):
         k, (T_3, T_1, T_2) = self._final_drives[direction], T
@@ -301,9 +271,8 @@ class PassiveMeter:
     """
 
     def __init__(self, model):
-        p, self._h = model.parameters, model.h
-        self._k, self._clutches = model.k, model.clutches
-        self.form = symmetric_form(p) if model.k.g_F else self_locking_form(p)
+        self._h, self._k, self._clutches = model.h, model.k, model.clutches
+        self.form = model.form
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
@@ -316,16 +285,17 @@ class PassiveMeter:
         if type(path) is Pattern:
             return linear_book(path.second, path.moments, path.losses, self.form, k.g_F, self._h,
                                x, end, integral, T)
-        u, parts = path
-        lost = numerical = None
-        for part in parts:
-            more, taken = self._part(u, part)
-            if lost is None:
-                lost, numerical = more, taken
-            else:
-                lost, numerical = tuple(map(add, lost, more)), numerical + taken
+        lost, numerical = path if type(path) is Booked else self._booked(*path)
         work = map(mul, T, self.angles(integral))
         return *work, energy_gained(self.form, x, end), *self._of_elements(lost), numerical
+
+    def _booked(self, u, parts):
+        first, *others = parts
+        lost, numerical = self._part(u, first)
+        for part in others:
+            more, taken = self._part(u, part)
+            lost, numerical = tuple(map(add, lost, more)), numerical + taken
+        return Booked(lost, numerical)
 
     def angles(self, integral):
         """Return the angles of the shafts with a port from the integral of x, rad."""

@@ -14,13 +14,18 @@ what it did, a tuple::
 
 from the speeds at the start to those at the end, with their integral over the step. ``point`` is
 what is known at the end and saves finding it again for the moments, or None; ``path`` tells the
-way between: the ``Pattern`` of an exact step, ``(u, parts)`` of ``adaptive.step``, or None where
-the flow tells it.
+way between: the ``Pattern`` of an exact step, ``(u, parts)`` of ``adaptive.step``, what was
+``Booked`` along it in C, or None where the flow tells it.
 """
+
+import struct
+from typing import NamedTuple
 
 import numpy as np
 
-from dm_ros.mechanism import clutched, passive, symmetric
+from dm_ros import core
+from dm_ros.mechanism import clutched, losses, passive, symmetric
+from dm_ros.mechanism.kinetic import self_locking_form, symmetric_form
 from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.motion import adaptive, held_torque
@@ -48,11 +53,19 @@ def no_solution(parameters):
                       'solution, some are too large or too small beside the others')
 
 
+class Booked(NamedTuple):
+    """What the elements lost along the path of a step, and what its error took, J."""
+
+    lost: tuple        # in the order of ``passive.lost_powers``
+    numerical: float
+
+
 class SymmetricModel:
     """A symmetric differential under the paper's law; x is (omega_1, omega_2)."""
 
     lagged = False
     half_shafts = ()
+    language = 'Python'   # of its steps
 
     def __init__(self, formulation, parameters, h):
         self.parameters, self.h = parameters, h
@@ -102,6 +115,7 @@ class ClutchedModel:
     """A self-locking differential under the paper's law; x is (omega_0, omega_1 - omega_2)."""
 
     half_shafts = ()
+    language = 'Python'   # of its steps
 
     def __init__(self, formulation, parameters, h):
         self.parameters, self.h = parameters, h
@@ -115,9 +129,24 @@ class ClutchedModel:
             direction: clutched.coefficients(
                 parameters, response, not self.lagged, direction)
             for direction, response in self.responses.items()}
+        self.losses, self.form = self._books()
+        self._core_step = core.paper_step
+        self.language = core.language if self._core_step else 'Python'
+        self._packed = {
+            direction: (core.packed(self.coefficients[direction]), self._packed_losses(direction))
+            for direction in self.responses}
 
     def _responses(self, formulation):
         return responses_of(formulation, self.parameters)
+
+    def _books(self):
+        """Return the coefficients of the losses by direction, and the form of the energy."""
+        p = self.parameters
+        return ({direction: losses.self_locking_losses(p, direction)
+                 for direction in self.responses}, self_locking_form(p))
+
+    def _packed_losses(self, direction):
+        return core.packed(self.losses[direction])
 
     def coefficients_of(self, direction):
         """Return the ``Coefficients`` of a direction of power flow, see ``clutched``."""
@@ -143,6 +172,10 @@ class ClutchedModel:
         """Advance by h; see the module for what is returned."""
         k = self.coefficients[direction]
         u = clutched.held(k, T, S)
+        if self._core_step:
+            end, integral, point, coarse, books = self._core_step(
+                *self._packed[direction], u, T, x, self.h, self.tolerance, self.form)
+            return x, direction, end, integral, point, coarse, Booked(*books)
         end, integral, point, coarse, parts = adaptive.step(
             adaptive.PAPER, k, u, x, self.h, self.tolerance)
         return x, direction, end, integral, point, coarse, (u, parts)
@@ -172,14 +205,24 @@ class ClutchedSymmetricModel(ClutchedModel):
     """A symmetric differential with clutches under the paper's law; x is as of the other."""
 
     def __init__(self, formulation, parameters, h):
-        super().__init__(formulation, parameters, h)
         self._g_F = parameters.g_F
-        self.final_drives = {direction: clutched.final_drive(response)
-                             for direction, response in self.responses.items()}
+        super().__init__(formulation, parameters, h)
 
     def _responses(self, formulation):
-        return {direction: symmetric.in_slip(response) for direction, response
-                in responses_of(formulation, self.parameters).items()}
+        responses = {direction: symmetric.in_slip(response) for direction, response
+                     in responses_of(formulation, self.parameters).items()}
+        self.final_drives = {direction: clutched.final_drive(response)
+                             for direction, response in responses.items()}
+        return responses
+
+    def _books(self):
+        p = self.parameters
+        return ({direction: losses.symmetric_losses(p, direction)
+                 for direction in self.responses}, symmetric_form(p))
+
+    def _packed_losses(self, direction):
+        return core.packed(self.losses[direction], self.final_drives[direction]) + (
+            struct.pack('d', self._g_F))
 
     def all_shafts(self, x):
         """Return the speeds of all shafts from x, or their angles from its integral, (5)-(7)."""
@@ -214,7 +257,10 @@ class PassiveModel:
         self._phi, self._preload = (clutched.full_friction(parameters) if clutches
                                     else ((0.0, 0.0), (0.0, 0.0)))
         self._g_2s = parameters.g_2s
+        self.form = (symmetric_form if self.k.g_F else self_locking_form)(parameters)
         self.tolerance = adaptive.TOLERANCE / 5   # signs that turn round make kinks
+        self._core_step, self._packed = core.passive_step, core.packed(self.k)
+        self.language = core.language if self._core_step else 'Python'
 
     def coefficients_of(self, flow):
         """Return the ``Coefficients``, see ``passive``; nothing depends on the flow."""
@@ -259,6 +305,10 @@ class PassiveModel:
         return clutched.pressing(self.parameters, M_1, M_2)
 
     def _adaptive_step(self, x, u, flow, here=None):
+        if self._core_step:
+            end, integral, point, coarse, books = self._core_step(
+                self._packed, u, x, self.h, self.tolerance, self.form)
+            return x, flow, end, integral, point, coarse, Booked(*books)
         end, integral, point, coarse, parts = adaptive.step(
             adaptive.PASSIVE, self.k, u, x, self.h, self.tolerance, here)
         return x, flow, end, integral, point, coarse, (u, parts)

@@ -3,6 +3,8 @@
 
 """Integrals along the path of a step, which is a sum of exponentials."""
 
+import math
+
 from dm_ros.motion.exponentials import phi_matrices, way
 
 
@@ -14,7 +16,7 @@ def lobatto(pieces):
 
     :return: ``(r, r^2, r^3, weight)`` of each node r in (0, 1), 1/2 first; the weights at 0 and 1.
     """
-    inner = (3 / 7)**0.5 / 2
+    inner = math.sqrt(3 / 7) / 2
     rule = ((0.0, 1 / 20), (0.5 - inner, 49 / 180), (0.5, 16 / 45), (0.5 + inner, 49 / 180),
             (1.0, 1 / 20))
     edges = [0.0] + [2.0**(n + 1 - pieces) for n in range(pieces)]
@@ -24,7 +26,7 @@ def lobatto(pieces):
             at = begin + (end - begin) * node
             weights[at] = weights.get(at, 0.0) + (end - begin) * weight
     first, last = weights.pop(0.0), weights.pop(1.0)
-    return tuple((r, r**2, r**3, weight) for r, weight in weights.items()), first, last
+    return tuple((r, r * r, r * r * r, weight) for r, weight in weights.items()), first, last
 
 
 # by the number of pieces

@@ -65,6 +65,11 @@ class Simulation:
         return self._variant.name
 
     @property
+    def language(self):
+        """What the steps are made in, 'C' or 'Python', to the same bits, see ``dm_ros.core``."""
+        return self._model.language
+
+    @property
     def shafts(self):
         """Names of all shafts."""
         return self.mechanism.shafts

@@ -95,6 +95,7 @@ class Diagnostics:
             'loop', active(self.waiting, self.driven, self.set_back, self.missing, plant.coarse,
                            plant.out_of_range), running, {
                 'variant': plant.simulation.variant,
+                'steps in': plant.simulation.language,
                 'rate wanted [Hz]': f'{1.0 / plant.simulation.dt:g}',
                 'rate held [Hz]': f'{(ticks - ticks_before) / (now - before) * 1e9:.2f}',
                 **lateness_values(pacer.take_lateness()),

@@ -112,7 +112,7 @@ class DifferentialNode(Node):
                   'speeds': mechanism.half_shafts, 'forces': mechanism.clutches}
         self.get_logger().info(', '.join([
             f'{settings.variant} at {settings.rate:g} Hz', settings.mode,
-            f'{settings.loss_law} law of losses',
+            f'{settings.loss_law} law of losses', f'steps in {self.simulation.language}',
             *(f'{kind} on {", ".join(names)}' for kind, names in inputs.items() if names)]))
 
     @property

@@ -1,0 +1,42 @@
+/* Copyright 2026 dm_ros developers
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The motion of a differential with clutches under the paper's law of losses: see
+ * dm_ros/mechanism/clutched.py and losses.py.
+ */
+
+#ifndef DM_ROS_CLUTCHED_H
+#define DM_ROS_CLUTCHED_H
+
+#include "core.h"
+
+/* In the order of clutched.Coefficients. */
+typedef struct {
+    double A_ww, A_ws, A_sw, A_ss, C_w1, C_w2, C_s1, C_s2, P_1w, P_1s, P_2w, P_2s;
+    double W_11, W_12, W_21, W_22, B_w0, B_w1, B_w2, B_s0, B_s1, B_s2;
+    double Q_10, Q_11, Q_12, Q_20, Q_21, Q_22, a_1, a_2, phi_1, phi_2, psi_1, psi_2;
+} clutched_coefficients;
+
+/* What is held in a step. */
+enum { B_W, B_S, M_ONE, M_TWO, S_1, S_2 };
+
+/* In the order of losses.SelfLockingLosses. */
+typedef struct {
+    double k_1, k_2, drag_w, drag_s, carrier_s, mesh_1, mesh_2, bearing_0, direct, reverse;
+} self_locking_losses;
+
+/* In the order of losses.SymmetricLosses, then of clutched.FinalDrive, then g_F. */
+typedef struct {
+    double drag_w, drag_s, pinion_w, carrier_w, carrier_s, mesh_F, mesh_1, mesh_2;
+    double pinion_F, pinion_T, pinion_L, carrier_1, carrier_2, carrier_F, carrier_L;
+    double P_w, P_s, Q_0, Q_1, Q_2, W_1, W_2;
+    double g_F;
+} symmetric_losses;
+
+/* The laws differ by their books alone. */
+extern const law dm_clutched, dm_clutched_symmetric;
+
+void dm_clutched_book(step *job, const part *path, double *lost, double *taken);
+void dm_clutched_symmetric_book(step *job, const part *path, double *lost, double *taken);
+
+#endif

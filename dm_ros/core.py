@@ -1,0 +1,41 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The ticks in C, where they are built: ``language`` is what is in use, ``'C'`` or ``'Python'``.
+
+Both give the same bits; Python is the reference, and what is left where there was no compiler.
+The environment variable ``DM_ROS_CORE`` chooses, ``c`` or ``python``; without it C is taken where
+it is built. In C are the adaptive steps under both laws, on torques, with their books.
+"""
+
+import dataclasses
+from importlib import import_module
+import os
+import struct
+
+CHOICE = 'DM_ROS_CORE'
+
+
+def _chosen(choice):
+    if choice not in ('', 'c', 'python'):
+        raise ImportError(f'{CHOICE}: {choice!r} is not one of c, python')
+    if choice != 'python':
+        try:
+            return import_module('dm_ros._core')
+        except ImportError as error:
+            if choice == 'c':
+                raise ImportError(f'{CHOICE}: c is not built here: {error}') from None
+    return None
+
+
+_module = _chosen(os.environ.get(CHOICE, ''))
+language = 'C' if _module else 'Python'
+STEPS = 'passive_step', 'paper_step'   # each None where Python does it
+passive_step, paper_step = (getattr(_module, name, None) for name in STEPS)
+
+
+def packed(*tables):
+    """Return the numbers of dataclasses of floats, one after the other, as C has them."""
+    values = [value for table in tables for value in dataclasses.astuple(table)]
+    return struct.pack(f'{len(values)}d', *values)
