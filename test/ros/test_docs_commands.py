@@ -28,7 +28,7 @@ def quoted():
         before = []
         text = re.sub(r'\\\n\s*', '', page.read_text())
         for line in re.findall(r'^ {4,}(\S.*)', text, re.MULTILINE):
-            ours = not re.match('ros2 ((run|launch) (?!dm_ros )|control )|.* ros2_control:=|'
+            ours = not re.match('ros2 ((run|launch) (?!dm_ros )|control |topic echo /joint)|.* ros2_control:=|'
                                 '.*_controller/', line)   # without ros2_control
             if line.startswith('ros2 ') and ours and '[' not in line:   # a synopsis is none
                 found.append((page.name, list(before), line))
