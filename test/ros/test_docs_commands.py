@@ -28,8 +28,9 @@ def quoted():
         before = []
         text = re.sub(r'\\\n\s*', '', page.read_text())
         for line in re.findall(r'^ {4,}(\S.*)', text, re.MULTILINE):
-            ours = not re.match('ros2 ((run|launch) (?!dm_ros )|control |topic echo /joint)|.* ros2_control:=|'
-                                '.*_controller/', line)   # without ros2_control
+            ours = not re.match(   # without ros2_control
+                'ros2 ((run|launch) (?!dm_ros )|control |topic echo /joint)|.* ros2_control:=|'
+                '.*_controller/', line)
             if line.startswith('ros2 ') and ours and '[' not in line:   # a synopsis is none
                 found.append((page.name, list(before), line))
             if re.match(r'\w+=|export |ros2 security ', line):
