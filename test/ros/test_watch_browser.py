@@ -18,6 +18,7 @@ from dm_ros.mechanism.variants import MECHANISMS
 from dm_ros.watch.scene import Scene
 
 webdriver = pytest.importorskip('selenium.webdriver')
+Keys = pytest.importorskip('selenium.webdriver.common.keys').Keys
 BROWSER, DRIVER = (next(filter(None, map(shutil.which, names)), None) for names in (
     ('chromium', 'chromium-browser', 'google-chrome'), ('chromedriver',)))
 pytestmark = pytest.mark.skipif(not (BROWSER and DRIVER), reason='no Chromium with its driver')
@@ -122,6 +123,20 @@ class Screen:
             slider.value = arguments[1];
             slider.dispatchEvent(new Event('input', {bubbles: true}));""", name, value)
 
+    def type(self, name, *keys):
+        """Type into the field of a port, over what it has."""
+        field = self.driver.find_element('css selector', f'#control input[type=text][name={name}]')
+        field.send_keys(Keys.CONTROL, 'a')
+        field.send_keys(*keys)
+
+    def port(self, name):
+        """Return what slider and field of a port show: [least, most, value, text, untouched]."""
+        return self.driver.execute_script("""
+            const [slider, field] = document.querySelectorAll(
+                `#control input[name=${arguments[0]}]`);
+            return [...['min', 'max', 'value'].map(key => Number(slider[key])), field.value,
+                slider.parentElement.className === 'untouched'];""", name)
+
     def press(self, words):
         """Press a button."""
         self.driver.execute_script("""
@@ -215,6 +230,60 @@ def test_a_slider_reaches_the_topic_and_zero_all_takes_it_back(ros, screen):
     count = len(messages)
     ros.until(lambda: node.plant.inputs.stale(node.simulation.ticks))
     assert len(messages) - count < 20 and not node.plant.inputs.refused
+
+
+def test_a_typed_number_is_taken_by_enter_or_tab_and_zero_keeps_its_place(ros, screen):
+    node = ros.differential('lsd_ode', torque_limit=20_000.0)
+    it = screen('--control')
+    ros.until(lambda: it.text('#state') == 'running')
+    begin = it.port('carrier')
+    assert begin == [-300, 300, 0, '0', True]
+    for keys, words in (('1e9', 'not allowed'), ('1,5', 'decimal point'), ('x', 'a number'),
+                        ('1e999', 'a number'), ('1,234.5', 'decimal point')):
+        it.type('carrier', keys, Keys.ENTER)
+        ros.until(lambda: words in it.text('#answer'))  # noqa: B023
+        ros.until(lambda: it.port('carrier') == begin)
+    it.type('carrier', '12345', Keys.ENTER)
+    ros.until(lambda: it.port('carrier') == [-12345, 12345, 12345, '12345', False])
+    ros.until(lambda: it.numbers('torque')['carrier'] == 12345)
+    it.type('carrier', '\N{MINUS SIGN}2.5', Keys.TAB)
+    ros.until(lambda: it.port('carrier')[3:] == ['-2.5', False])
+    ros.until(lambda: it.numbers('torque')['carrier'] == -2.5)
+    it.type('carrier', '1e9', Keys.ENTER)
+    ros.until(lambda: 'not allowed' in it.text('#answer'))
+    ros.until(lambda: it.port('carrier')[:2] + it.port('carrier')[3:]
+              == [-12345, 12345, '-2.5', False])
+    it.type('rear_clutch', '6000', Keys.ENTER)
+    ros.until(lambda: it.port('rear_clutch') == [0, 6000, 6000, '6000', False])
+    assert not node.plant.inputs.refused
+
+
+def test_a_number_that_is_not_whole_is_never_commanded(ros, screen):
+    ros.differential('lsd_ode')
+    messages = []
+    ros.node.create_subscription(JointState, '/differential/torques', messages.append, 1000)
+    it = screen('--control')
+    ros.until(lambda: it.text('#state') == 'running')
+    button = {words: next(found for found in it.driver.find_elements('css selector', 'button')
+                          if found.text == words) for words in ('Pause', 'Continue', 'Let go')}
+    it.type('front', '7', Keys.ENTER)
+    ros.until(lambda: it.port('front')[3:] == ['7', False])
+    it.type('front', '70', Keys.ESCAPE)
+    assert it.port('front')[3:] == ['7', False]
+    for words in ('Pause', 'Continue'):
+        it.type('front', '700')
+        button[words].click()
+        assert it.port('front')[3:] == ['7', False]
+        ros.until(lambda: it.text('#answer').startswith(words.lower()))  # noqa: B023
+    it.type('rear', '70')
+    it.type('front', '700')
+    button['Let go'].click()
+    ros.until(lambda: it.text('#answer') == 'let go')
+    for shaft in ('front', 'rear'):
+        assert it.port(shaft)[2:] == [0, '0', True]
+    ros.until(lambda: messages and list(messages[-1].effort) == [0.0])
+    assert {(*message.name, *message.effort) for message in messages} == {
+        ('front', 7.0), ('front', 0.0)}
 
 
 def test_the_buttons_pause_step_and_go_on(ros, screen):

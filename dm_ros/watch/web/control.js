@@ -7,6 +7,25 @@ import {make, words} from './words.js';
 
 const TICKS = [1, 10, 100];
 const QUIET = 40;   // ms from one message of a slider that moves to the next
+const ENDS = ['zero', 'release'];   // what ends all commands of the sliders
+const DONE = {set: '', zero: 'all zero', release: 'let go'};
+
+// The number that a text is, as JSON and no locale has it, or null.
+function parsed(text) {
+  const plain = text.trim().replace('\u2212', '-');
+  const value = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
+  return Number.isFinite(value) ? value : null;
+}
+
+// Why a port cannot have a value, in words, or null.
+function refused({name, unit, low, high}, value, text) {
+  if (value !== null) {
+    return value < low || value > high
+      ? `${name}: ${value} ${unit} is not allowed, it must be in [${low}, ${high}]` : null;
+  }
+  return text.includes(',') ? `${name}: ${text} is not taken, write a decimal point, as in 1.5`
+    : `${name}: a number is expected, not "${text}"`;
+}
 
 export class Control {
   constructor(element) {
@@ -16,6 +35,7 @@ export class Control {
     this.rows = new Map();
     this.waiting = null;   // values that a slider has and the server has not
     this.told = {};        // values that the server has
+    this.flushed = Promise.resolve();   // when the last values have been sent
   }
 
   show(scene) {
@@ -57,6 +77,7 @@ export class Control {
           + 'What was sent holds until another message or a reset.'
         : 'What you move is sent again and again while this page is open, and zero when you let '
           + 'go or leave. What you did not move is left to others.'));
+    this.tell(this.told);
   }
 
   // Show what all viewers command now.
@@ -70,9 +91,12 @@ export class Control {
     }
   }
 
+  // Show the value that is in force; the range grows with it, and zero keeps its place.
   #put({slider, field}, value) {
-    if (value > Number(slider.max)) slider.max = value;
-    if (value < Number(slider.min)) slider.min = value;
+    const reach = Math.max(slider.max, Math.abs(value));
+    if (slider.min < 0) slider.min = -reach;
+    slider.max = reach;
+    slider.step = (slider.max - slider.min) / 600;
     slider.value = value;
     field.value = String(Number(value.toPrecision(6)));
   }
@@ -81,8 +105,10 @@ export class Control {
     const label = make('label', 'untouched'), slider = make('input'), field = make('input');
     slider.type = 'range';
     [slider.min, slider.max, slider.step] = [port.from, port.to, (port.to - port.from) / 600];
-    field.type = 'number';
-    [field.min, field.max, field.step] = [port.low, port.high, 'any'];
+    field.type = 'text';   // of type number "1,5" would be 15 in some browsers
+    field.inputMode = 'decimal';
+    field.autocomplete = 'off';
+    field.title = `${port.low} to ${port.high} ${port.unit}: Enter or Tab takes it, Esc gives it up`;
     slider.value = 0;
     field.value = '0';
     slider.setAttribute('aria-label', `${port.name} ${port.kind}`);
@@ -95,24 +121,37 @@ export class Control {
     }
     slider.addEventListener('input', () => {
       // the middle of a slider is hard to hit
-      const near = Math.abs(slider.value) < (port.to - port.from) / 150 ? 0 : Number(slider.value);
+      const near = Math.abs(slider.value) < (slider.max - slider.min) / 150 ? 0 : Number(slider.value);
+      row.typing = false;
       field.value = String(Number(near.toPrecision(4)));
       this.#set(port.name, near);
     });
-    field.addEventListener('input', () => { row.typing = true; });
-    field.addEventListener('blur', () => { row.typing = false; });
-    field.addEventListener('change', () => {
+    const giveUp = () => {
       row.typing = false;
-      const value = field.valueAsNumber;
-      if (Number.isFinite(value)) {
-        this.#put(row, value);
+      this.#put(row, this.#inForce(port.name));
+    };
+    field.addEventListener('input', () => { row.typing = true; });
+    // whoever clicks elsewhere, as on a button, has not said that the number is whole
+    field.addEventListener('blur', () => { if (row.typing) giveUp(); });
+    field.addEventListener('keydown', event => {
+      if (event.key === 'Escape') giveUp();
+      if (!row.typing || event.key !== 'Enter' && event.key !== 'Tab') return;
+      const value = parsed(field.value), refusal = refused(port, value, field.value);
+      if (refusal) {
+        this.#say(refusal, true);
+        giveUp();
+      } else {
+        row.typing = false;
         this.#set(port.name, value);
-      } else this.#say(`${port.name}: a number is expected`, true);
+      }
     });
     label.append(make('span', '', words(port.name)), slider, field, make('span', 'none', port.unit));
     this.rows.set(port.name, row);
     return label;
   }
+
+  // The value that a port has, or has as soon as the server takes it.
+  #inForce(name) { return this.waiting?.[name] ?? this.told[name] ?? 0; }
 
   // Send a value soon, together with others that change meanwhile.
   #set(name, value) {
@@ -121,15 +160,27 @@ export class Control {
       return;
     }
     this.waiting = {[name]: value};
-    setTimeout(() => {
-      const values = this.waiting;
-      this.waiting = null;
-      if (values) this.#ask({do: 'set', values});
-    }, QUIET);
+    setTimeout(() => this.#flush(), QUIET);
   }
 
+  // Send what waits, one message after the other, so that the last one counts.
+  #flush() {
+    this.flushed = this.flushed.then(() => {
+      const values = this.waiting;
+      this.waiting = null;
+      return values && this.#post({do: 'set', values});
+    });
+    return this.flushed;
+  }
+
+  // Ask for what a button says, after what the sliders have, or instead of it.
   async #ask(request) {
-    if (request.do !== 'set') this.waiting = null;
+    if (ENDS.includes(request.do)) this.waiting = null;
+    await this.#flush();
+    await this.#post(request);
+  }
+
+  async #post(request) {
     try {
       const response = await fetch('control', {
         method: 'POST', body: JSON.stringify({...request, viewer: this.viewer}),
@@ -139,11 +190,21 @@ export class Control {
         this.tell(this.told);
       } else {
         const {success, message} = await response.json();
-        this.#say(request.do === 'set' ? '' : `${request.do}: ${message || 'done'}`, !success);
+        this.#say(DONE[request.do] ?? `${request.do}: ${message || 'done'}`, !success);
+        this.#done(request);
       }
     } catch {
       this.#say('watch does not answer', true);
+      this.tell(this.told);
     }
+  }
+
+  // Show what a request has changed, also where the server had nothing new to tell.
+  #done({do: work, values}) {
+    if (work === 'set') this.tell({...this.told, ...values});
+    if (!ENDS.includes(work)) return;
+    for (const row of this.rows.values()) row.held = row.typing = false;
+    this.tell(work === 'zero' ? Object.fromEntries([...this.rows.keys()].map(name => [name, 0])) : {});
   }
 
   #say(text, bad) {
