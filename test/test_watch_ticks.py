@@ -93,7 +93,18 @@ def test_no_line_goes_across_a_pause_or_a_reset():
     strips.add(3000 * MS, (2.0,))               # a pause
     strips.add(3001 * MS, (3.0,), is_reset=True)
     strips.close()
-    assert taken(strips) == (False, [[0.0, 1.0], None, [3.0, 2.0], None, [3.001, 3.0]])
+    assert taken(strips) == (False, [[0.0, 1.0], None, [0.25, 2.0], None, [0.251, 3.0]])
+
+
+def test_a_long_pause_pushes_nothing_out_of_the_strips():
+    strips = Strips(0.001)
+    for begin in (0, 3_600_000, 7_200_000):
+        for n in range(100):
+            strips.add((begin + n) * MS, (1.0,))
+    strips.close()
+    rows = kept(strips)
+    assert rows[0] == [0.0, 1.0] and rows[-1] == [pytest.approx(0.797), 1.0]
+    assert rows.count(None) == 2
 
 
 def test_the_line_of_a_slow_node_goes_on():

@@ -80,8 +80,9 @@ class Strips:
     The last ``SPAN`` s of some columns, as rows that are drawn, each as JSON.
 
     ``take`` returns what is new. A row is ``[time, number, ...]`` with the time in s since the
-    first one, or ``null`` where no line goes across: after a pause, or at a reset. A time that
-    goes back empties all.
+    first one, or ``null`` where no line goes across: after a pause, or at a reset. The time stands
+    in a pause but for ``gap`` s, so that a long one does not push the rows out. A stamp that goes
+    back empties all.
     """
 
     def __init__(self, period=0.0):
@@ -102,6 +103,7 @@ class Strips:
             self._origin = stamp
         elif is_reset or stamp - self._last > self.gap * 1e9:
             self.close()
+            self._origin += max(0, stamp - self._last - int(self.gap * 1e9))
             self._keep((stamp - self._origin) * 1e-9, 'null')
         elif stamp - self._begin >= BUCKET:
             self.close()

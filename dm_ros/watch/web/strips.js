@@ -7,6 +7,7 @@ import {role} from './colours.js';
 import {number} from './words.js';
 
 const SPAN = 30;            // s
+const LEAST = 1e-3;         // of a unit, that an axis spans at least: less is rounding
 const LAST = 24;            // px of the axis of time, below the last strip
 const TITLES = {speeds: 'Speeds', slip: 'Ahead of the carrier', moments: 'Internal moments',
   torques: 'Torques', forces: 'Clutch forces', index: 'Power flow'};
@@ -18,6 +19,13 @@ function drawn(scene, name) {
   const shaft = scene.meshes[name] || scene.clutches[name] || name;
   return {colour: name === 'power_flow' ? 0 : role(scene.shafts, shaft),
     dashed: name in scene.clutches};
+}
+
+// Which numbers of a series have no neighbour to which a line could go, as after a single step.
+function alone(plot, series) {
+  const values = plot.data[series];
+  return [...values.keys()].filter(
+    i => values[i] != null && values[i - 1] == null && values[i + 1] == null);
 }
 
 export class Strips {
@@ -68,6 +76,7 @@ export class Strips {
   // Take the newest numbers of all columns, which are told where the cursor is nowhere.
   tell(newest) {
     this.newest = newest;
+    this.#values();
   }
 
   // Draw what has come since the last time.
@@ -123,7 +132,7 @@ export class Strips {
       header.append(key);
       keys.push(value);
       return {label: name, stroke: lines[colour], width: 1.4, dash: dashed ? [5, 3] : undefined,
-        points: {show: false}, paths: strip.name === 'index' ? uPlot.paths.stepped({align: 1}) : undefined};
+        points: {show: true, filter: alone, size: 4, fill: lines[colour]}, paths: strip.name === 'index' ? uPlot.paths.stepped({align: 1}) : undefined};
     });
     box.append(header);
     this.element.append(box);
@@ -153,7 +162,9 @@ export class Strips {
   #range(low, high) {
     if (low == null) return [-1, 1];
     const least = Math.min(low, 0), most = Math.max(high, 0), span = most - least;
-    return span ? [least - 0.06 * span, most + 0.06 * span] : [-1, 1];
+    if (!span) return [-1, 1];
+    if (span < LEAST) return [-LEAST, LEAST];
+    return [least - 0.06 * span, most + 0.06 * span];
   }
 
   // Tell the numbers under the cursor, or the newest.
