@@ -332,7 +332,33 @@ def test_the_page_waits_for_a_node_and_finds_the_next_of_another_variant(ros, sc
             ros.until(lambda: it.text('#kind').startswith(variant)  # noqa: B023
                       and shaft in it.numbers('speed'))  # noqa: B023
             node.ended(signal.SIGINT)
-            ros.until(lambda: it.text('#state') == 'waiting for the node')
+            ros.until(lambda: it.text('#state') == 'node gone')
+
+
+STRIP = """
+const values = [...document.querySelectorAll('[data-series]')].map(e => e.textContent);
+return [...document.querySelectorAll('.uplot canvas')].map(e => e.toDataURL()).concat(values);
+"""
+
+
+def test_what_was_seen_stays_when_the_node_goes_until_the_next_one_comes(ros, screen):
+    it = screen()
+    ros.until(lambda: it.text('#state') == 'waiting for the node')
+    start = command('differential'), '--ros-args', '-p', 'variant:=lsd_ode'
+    with Forked(*start, '-p', 'initial_velocity.rear:=30.0') as node:
+        ros.until(lambda: it.text('#state') == 'running' and it.numbers('speed').get('rear'))
+        ros.until(lambda: 'loop' in it.text('#diagnostics'))
+        node.ended(signal.SIGINT)
+    ros.until(lambda: it.text('#state') == 'node gone')
+    assert 'Waiting for the node /differential.' in it.text('#waiting')
+    ros.until(lambda: it.different(4) == 1)
+    strips = it.driver.execute_script(STRIP)
+    assert it.numbers('speed')['rear'] and it.text('#kind') and 'loop' in it.text('#diagnostics')
+    assert len(it.driver.execute_script(PICTURE)) > 10_000
+    assert it.driver.execute_script(STRIP) == strips and '\N{EN DASH}' not in strips
+    with Forked(*start):
+        ros.until(lambda: it.text('#state') == 'running' and it.numbers('speed').get('rear') == 0)
+        assert not it.text('#waiting') and it.driver.execute_script(STRIP) != strips
 
 
 @contextmanager

@@ -23,7 +23,8 @@ const control = new Control($('control'));
 drawing.onResize = () => {
   drawing.labels = labels.boxes($('drawing').getBoundingClientRect());
 };
-let scene = null, heard = null, connected = false, paused = false;
+let scene = null, shown = null, newest = null;   // of the node, of the last one, its powers
+let heard = null, connected = false, paused = false;
 let most = {power: new Most(), heat: new Most()};
 
 const seconds = () => performance.now() / 1000;
@@ -36,15 +37,20 @@ function show(description) {
   paused = false;
   document.title = `${description.node} \u2013 watch`;
   $('node').textContent = description.node;
-  $('kind').textContent = scene
-    ? `${scene.variant}, ${scene.rate} Hz, ${scene.mode}, ${scene.law} law of losses` : '';
+  // what was seen of a node stays when it goes, until the next one comes
+  if (scene || description.refusal) shown = scene;
   $('waiting').hidden = Boolean(scene);
-  document.querySelector('main').classList.toggle('waiting', !scene);
+  document.querySelector('main').classList.toggle('waiting', !shown);
   document.querySelector('.node').textContent = description.node;
   $('refusal').hidden = !description.refusal;
   $('refusal').textContent = `It is there, but cannot be shown: ${description.refusal}`;
   $('how').textContent = how(description.node);
+  control.show(scene);
+  if (shown && !scene) return;
+  $('kind').textContent = scene
+    ? `${scene.variant}, ${scene.rate} Hz, ${scene.mode}, ${scene.law} law of losses` : '';
   $('loss').textContent = '';
+  newest = null;
   most = {power: new Most(), heat: new Most()};
   drawing.show(scene);
   labels.show(scene, drawing.colours);
@@ -54,7 +60,6 @@ function show(description) {
     strips.show(scene);
     diagnostics.tell([]);
   }
-  control.show(scene);
   $('scale').textContent = '';
   $('note').textContent = !scene ? '' : !scene.gears ? `not drawn: ${scene['not drawn']}`
     : scene.gears.exact ? '' : 'ratios and numbers of gears are drawn near the true ones';
@@ -71,8 +76,9 @@ function how(node) {
 }
 
 function ticks({emptied, rows, now}) {
+  if (!scene) return;   // of a node that has gone the strips stay
   strips.add(rows, emptied);
-  if (!scene || !now) return;
+  if (!now) return;
   heard = seconds();
   paused = false;
   labels.tell(now);
@@ -81,6 +87,7 @@ function ticks({emptied, rows, now}) {
   const powers = powersOf(scene, now);
   powers.most = {power: most.power.of(Object.values(powers.meshes).concat(
     Object.values(powers.shafts)), heard), heat: most.heat.of(Object.values(powers.clutches), heard)};
+  newest = {now, powers};
   drawing.colour(powers);
   legend.tell(powers);
   if (scene.gears) {
@@ -91,6 +98,7 @@ function ticks({emptied, rows, now}) {
 }
 
 function told(statuses) {
+  if (!scene) return;
   diagnostics.tell(statuses);
   paused = statuses.some(({name, message}) => name === 'loop' && message === 'paused');
 }
@@ -98,7 +106,7 @@ function told(statuses) {
 // What the node is doing, in words, and how good that is.
 function state() {
   if (!connected) return ['no connection to watch', 'error'];
-  if (!scene) return ['waiting for the node', 'warn'];
+  if (!scene) return shown ? ['node gone', 'error'] : ['waiting for the node', 'warn'];
   const quiet = heard === null ? Infinity : seconds() - heard;
   if (quiet < Math.max(SILENT, 5 / scene.rate)) return ['running', 'ok'];
   if (paused) return ['paused', 'warn'];
@@ -156,8 +164,12 @@ function frame() {
 
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
   strips.recolour(drawing.colours);
-  labels.show(scene, drawing.colours);
-  legend.show(scene, drawing.colours);
+  labels.show(shown, drawing.colours);
+  legend.show(shown, drawing.colours);
+  if (!newest) return;
+  labels.tell(newest.now);
+  legend.tell(newest.powers);
+  strips.tell(numbersOf(shown, newest.now));
 });
 setInterval(tellState, 200);
 connect();
