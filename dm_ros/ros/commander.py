@@ -56,6 +56,8 @@ class Commander:
         elif word == 'release':
             commands.release()
         else:
+            if word == 'reset':   # what starts anew stands, and is not driven on
+                commands.release()
             return self._ask(word, request.get('count', 1))
         return {'success': True, 'message': ''}
 

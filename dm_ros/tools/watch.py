@@ -59,6 +59,18 @@ def _port(text):
     return port
 
 
+def watched_name(node, text):
+    """Return the full name of the node to watch; raise ValueError where it is none."""
+    words = (f'--node: {text!r} is not the name of a node, such as differential or '
+             '/rear/differential')
+    if not text.rstrip('/'):
+        raise ValueError(words)
+    try:
+        return full_name(node, text)
+    except (RuntimeError, ValueError, NameValidationException) as error:   # in words of rcl
+        raise ValueError(words) from error
+
+
 def watch(args, arguments, ended):
     """Serve the page until ``ended`` is set."""
     viewers, commands = Viewers(), Commands()
@@ -71,7 +83,7 @@ def watch(args, arguments, ended):
         prefer_udp()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node('watch')
-        name = full_name(node, arguments.node)
+        name = watched_name(node, arguments.node)
         live, asked = Live(name, viewers, commands), Asked(node)
         watched = Watched(node, name, live, asked)
         if arguments.control:
@@ -79,6 +91,9 @@ def watch(args, arguments, ended):
             viewers.on_leave = commands.leave
         serving.start()
         print(f'watching {name}: {server.url}', flush=True)
+        if server.guard.is_open:
+            may = 'sees this page' + ' and can command the node' * arguments.control
+            print(f'everybody who reaches {arguments.host} {may}, without a password', flush=True)
         while not ended.wait(min(PERIOD, commander.period if commander else PERIOD)):
             watched.poll()
             if commander:

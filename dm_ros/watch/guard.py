@@ -43,6 +43,7 @@ class Guard:
         self._port = port
         bound = ipaddress.ip_address(address)
         self._names = {host.lower(), address}
+        self.is_open = not bound.is_loopback   # others than this machine may reach it
         if bound.is_loopback:
             self._names |= {'localhost'}
         self._any_address = bound.is_unspecified   # it is asked for by each address of the host

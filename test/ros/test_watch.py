@@ -304,6 +304,15 @@ def test_a_signal_ends_it_with_zero_also_with_viewers(ros, start, number, with_n
     assert process.returncode == 0 and process.errors == ''
 
 
+@pytest.mark.parametrize('arguments, words', [
+    ([], ''), (['--control'], ' and can command the node')])
+def test_it_says_who_reaches_a_page_that_is_not_for_this_machine_alone(ros, arguments, words):
+    with Forked(command('watch'), '--port', 0, '--host', '0.0.0.0', *arguments) as process:
+        process.says('password\n')
+        assert process.output.splitlines()[1] == (
+            f'everybody who reaches 0.0.0.0 sees this page{words}, without a password')
+
+
 def test_a_port_that_is_taken_ends_it_with_two_and_one_line(start):
     _, port = start()
     with Forked(command('watch'), '--port', port) as second:
@@ -314,7 +323,9 @@ def test_a_port_that_is_taken_ends_it_with_two_and_one_line(start):
 @pytest.mark.parametrize('arguments, words', [
     (['--port', '70000'], '70000 must be in [0, 65535]'), (['--port', 'x'], '--port'),
     (['--host', 'no.such.host.invalid'], 'port 8350 of no.such.host.invalid: '),
-    (['--node', 'a-b', '--port', '0'], 'watch: error: failed to resolve name: ')])
+    *((['--node', name, '--port', '0'],
+       f'watch: error: --node: {name!r} is not the name of a node, such as differential or '
+       '/rear/differential\n') for name in ('a-b', '', 'a//b', '1a'))])
 def test_a_bad_command_line_ends_it_with_two(ros, arguments, words):
     with Forked(command('watch'), *arguments) as process:
         assert process.ended() == 2

@@ -300,6 +300,30 @@ def test_the_buttons_pause_step_and_go_on(ros, screen):
     ros.until(lambda: it.text('#answer') == 'continue: running')
 
 
+def test_the_page_knows_at_once_that_it_paused_the_node_and_a_reset_lets_go(ros, screen):
+    node = ros.differential()
+    it = screen('--control')
+    ros.until(lambda: it.text('#state') == 'running')
+    it.press('Pause')
+    ros.until(lambda: it.text('#state') == 'paused')
+    it.driver.execute_script("""
+        window.states = [];
+        const state = document.getElementById('state');
+        new MutationObserver(() => window.states.push(state.textContent))
+            .observe(state, {childList: true});""")
+    for _ in range(3):
+        ticks = node.plant.ticks
+        it.press('Step')
+        ros.until(lambda: node.plant.ticks > ticks)  # noqa: B023
+    it.type('left', '5', Keys.ENTER)
+    ros.until(lambda: it.port('left')[3:] == ['5', False])
+    it.press('Reset')
+    ros.until(lambda: it.text('#answer').startswith('reset'))
+    assert it.port('left')[2:] == [0, '0', True]
+    ros.until(lambda: it.driver.execute_script('return window.states.length') > 8)
+    assert set(it.driver.execute_script('return window.states')) == {'paused'}
+
+
 def test_without_control_there_is_nothing_to_press(ros, screen):
     ros.differential()
     it = screen()
@@ -317,7 +341,11 @@ def test_a_warning_is_seen_at_once_and_its_values_unfold(ros, screen):
     def is_told():
         publisher.publish(refused)
         return 'torques: messages are refused' in it.text('#alarm')
+    place = it.driver.find_element('id', 'picture').rect
     ros.until(is_told)
+    assert it.driver.find_element('id', 'picture').rect == place
+    alarm = it.driver.find_element('id', 'alarm')
+    assert alarm.get_attribute('title') == alarm.text
     assert "'nobody'" not in it.text('#diagnostics')
     for summary in it.driver.find_elements('css selector', '#diagnostics summary'):
         summary.click()
@@ -339,6 +367,46 @@ STRIP = """
 const values = [...document.querySelectorAll('[data-series]')].map(e => e.textContent);
 return [...document.querySelectorAll('.uplot canvas')].map(e => e.toDataURL()).concat(values);
 """
+
+
+# how many pixels of the strip of speeds have the colour of the first output, in light
+COLOURED = """
+const canvas = document.querySelector('.uplot canvas');
+const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+let count = 0;
+for (let i = 0; i < data.length; i += 4) {
+  count += data[i] === 0x2f && data[i + 1] === 0x74 && data[i + 2] === 0xc0;
+}
+return count;
+"""
+
+
+def test_a_single_tick_is_a_dot_in_the_strips(ros, screen, chromium):
+    chromium.execute_cdp_cmd('Emulation.setEmulatedMedia', {
+        'features': [{'name': 'prefers-color-scheme', 'value': 'light'}]})
+    ros.differential('lsd_ode', mode='lockstep', initial_velocity__front=30.0)
+    it = screen('--control')
+    ros.until(lambda: it.text('#state') == 'waits for messages on ~/torques')
+    assert it.driver.execute_script(COLOURED) == 0
+    it.press('1 tick')
+    ros.until(lambda: it.numbers('speed').get('front'))
+    ros.until(lambda: it.driver.execute_script(COLOURED) > 3)
+
+
+def test_the_drawing_and_the_strips_tell_the_same_tick(ros, screen):
+    ros.differential('lsd_ode', initial_velocity__rear=30.0)
+    it = screen('--control')
+    ros.until(lambda: it.text('#state') == 'running' and it.numbers('speed').get('rear'))
+    it.type('rear', '200', Keys.ENTER)
+    seen = set()
+
+    def changes():
+        pair = it.driver.execute_script("""return ['[data-speed=rear]', '[data-series="speeds.rear"]']
+            .map(query => document.querySelector(query).textContent);""")
+        assert pair[0] == f'{pair[1]} rad/s'
+        seen.add(pair[1])
+        return len(seen) > 20
+    ros.until(changes)
 
 
 def test_what_was_seen_stays_when_the_node_goes_until_the_next_one_comes(ros, screen):

@@ -7,7 +7,7 @@ import {make, words} from './words.js';
 
 const TICKS = [1, 10, 100];
 const QUIET = 40;   // ms from one message of a slider that moves to the next
-const ENDS = ['zero', 'release'];   // what ends all commands of the sliders
+const ENDS = ['zero', 'release', 'reset'];   // what ends all commands of the sliders
 const DONE = {set: '', zero: 'all zero', release: 'let go'};
 
 // The number that a text is, as JSON and no locale has it, or null.
@@ -33,6 +33,7 @@ export class Control {
     this.token = document.querySelector('meta[name=token]')?.content;
     this.viewer = null;
     this.rows = new Map();
+    this.onDone = () => {};   // is told what a button has done
     this.waiting = null;   // values that a slider has and the server has not
     this.told = {};        // values that the server has
     this.flushed = Promise.resolve();   // when the last values have been sent
@@ -65,7 +66,7 @@ export class Control {
     button('Pause', {do: 'pause'}, 'stop the ticks');
     button('Continue', {do: 'continue'}, 'go on');
     button('Step', {do: 'step'}, 'one tick while paused');
-    button('Reset', {do: 'reset'}, 'speeds and angles back to the start');
+    button('Reset', {do: 'reset'}, 'let go, and speeds and angles back to the start');
     this.answer = make('span');
     this.answer.id = 'answer';
     this.answer.setAttribute('role', 'status');
@@ -192,6 +193,7 @@ export class Control {
         const {success, message} = await response.json();
         this.#say(DONE[request.do] ?? `${request.do}: ${message || 'done'}`, !success);
         this.#done(request);
+        if (success) this.onDone(request.do);
       }
     } catch {
       this.#say('watch does not answer', true);

@@ -29,11 +29,18 @@ let most = {power: new Most(), heat: new Most()};
 
 const seconds = () => performance.now() / 1000;
 
+// the page knows of its own pause at once; of those of others /diagnostics tells
+let held = null;   // s, when this page paused the node, which has not gone on
+control.onDone = work => {
+  if (work === 'pause') held = seconds();
+  if (work === 'continue') held = null;
+};
+
 function show(description) {
   const same = scene && description.variant
     && JSON.stringify(scene.strips) === JSON.stringify(description.strips);
   scene = description.variant ? description : null;
-  heard = null;
+  heard = held = null;
   paused = false;
   document.title = `${description.node} \u2013 watch`;
   $('node').textContent = description.node;
@@ -101,12 +108,14 @@ function told(statuses) {
   if (!scene) return;
   diagnostics.tell(statuses);
   paused = statuses.some(({name, message}) => name === 'loop' && message === 'paused');
+  if (!paused && seconds() - held > SILENT) held = null;   // somebody else let it go on
 }
 
 // What the node is doing, in words, and how good that is.
 function state() {
   if (!connected) return ['no connection to watch', 'error'];
   if (!scene) return shown ? ['node gone', 'error'] : ['waiting for the node', 'warn'];
+  if (held !== null) return ['paused', 'warn'];
   const quiet = heard === null ? Infinity : seconds() - heard;
   if (quiet < Math.max(SILENT, 5 / scene.rate)) return ['running', 'ok'];
   if (paused) return ['paused', 'warn'];

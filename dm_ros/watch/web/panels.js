@@ -97,8 +97,8 @@ export class Legend {
     this.element.hidden = !scene;
     if (!scene) return;
     const heats = Object.keys(scene.clutches);
-    this.#part('power', 'Power through each mesh', Object.keys(scene.meshes));
-    if (heats.length) this.#part('heat', 'Heat in each clutch', heats);
+    this.#part('power', 'Power through each mesh, by magnitude', Object.keys(scene.meshes));
+    if (heats.length) this.#part('heat', 'Heat in each clutch, by magnitude', heats);
   }
 
   #part(ramp, title, names) {
@@ -158,7 +158,8 @@ export class Diagnostics {
     const bad = statuses.filter(status => status.level !== 'ok');
     this.alarm.hidden = !bad.length;
     this.alarm.className = `badge ${bad.some(status => status.level === 'error') ? 'error' : 'warn'}`;
-    this.alarm.textContent = bad.map(({name, message}) => `${name}: ${message}`).join(' · ');
+    this.alarm.textContent = bad.map(({name, message}) => `${name}: ${message}`).join(' · ') || '\u00a0';
+    this.alarm.title = this.alarm.textContent;   // whole, where there is no room for it
   }
 
   #row({name, level, message, values}) {
