@@ -59,13 +59,10 @@ static int copied(const char *what, const char *bytes, Py_ssize_t size, void *in
 static int advanced(step *job, PyObject *y, int count, PyObject **books)
 {
     double start[2];
-    int failed;
     if (!numbers(y, "y", 2, start))
         return 0;
-    Py_BEGIN_ALLOW_THREADS
-    failed = dm_advance(job, (pair){start[0], start[1]});
-    Py_END_ALLOW_THREADS
-    if (failed) {
+    /* the interpreter stays held: to get it back from another thread may take longer than this */
+    if (dm_advance(job, (pair){start[0], start[1]})) {
         PyErr_SetString(PyExc_ArithmeticError, "no speed in reach fits");
         return 0;
     }
