@@ -143,7 +143,10 @@ export class Strips {
       width: 300, height: 100, legend: {show: false}, padding: [6, 14, last ? 0 : 4, 0],
       cursor: {sync: {key: SYNC.key}, drag: {x: false, y: false}, points: {size: 5}},
       scales: {
-        x: {time: false, range: (_, low, high) => [(high ?? SPAN) - SPAN, high ?? SPAN]},
+        x: {time: false, range: ({data}) => {   // uPlot would give a single time a range of its own
+          const end = data?.[0].at(-1) ?? SPAN;
+          return [end - SPAN, end];
+        }},
         y: {range: isIndex ? [-1.5, 1.5] : (_, low, high) => this.#range(low, high)}},
       axes: [
         {...axis, show: true, size: last ? LAST : 0, gap: 3,
