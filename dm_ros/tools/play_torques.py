@@ -10,6 +10,7 @@ import sys
 import time
 from typing import Callable, NamedTuple
 
+from diagnostic_msgs.msg import DiagnosticArray
 import rclpy
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException
@@ -32,6 +33,8 @@ from dm_ros.mechanism.variants import (
     VARIANTS,
     WITH_CLUTCHES,
 )
+from dm_ros.ros.messages import never_called, Polled
+from dm_ros.ros.privates import poll
 from dm_ros.ros.recorder import Taps
 from dm_ros.ros.transport import prefer_udp
 from dm_ros.settings import NodeParameters, port_parameters, speed_ports
@@ -113,6 +116,9 @@ class Player:
         :param taps: ``Taps`` to be polled, if any.
         """
         self._node, self._taps = node, taps
+        self._differential, self._told = full_name(node, target), False
+        self._diagnostics = node.create_subscription(
+            DiagnosticArray, '/diagnostics', never_called, 10, callback_group=Polled())
         reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
         self._publisher = node.create_publisher(JointState, topic_of(target), reliable)
         self._idle, self._commands = [port.idle for port in ports], CommandMessage(ports, prefix)
@@ -156,6 +162,19 @@ class Player:
                 bar.update(due - n)
                 n = due
                 self._sleep_until(start + n / rate)
+                self._tell_refusals()
+
+    def _tell_refusals(self):
+        """Tell once what the differential says of messages that it refuses."""
+        for message, _ in poll(self._diagnostics):
+            for status in message.status:
+                if (not self._told and status.hardware_id == self._differential
+                        and 'messages are refused' in status.message):
+                    self._told = True
+                    reason = next((pair.value for pair in status.values
+                                   if pair.key == 'last refused'), '')
+                    self._node.get_logger().warning(
+                        f'{self._differential} refuses messages: {reason}')
 
     def unload(self):
         """Publish what an idle port has and wait until it has arrived."""

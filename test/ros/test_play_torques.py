@@ -173,3 +173,12 @@ def test_bad_arguments_end_it_with_one_line(play, arguments, part):
     *usage, error = process.errors.splitlines()
     assert part in error
     assert not usage or usage[0].startswith('usage:')
+
+
+def test_a_load_for_another_variant_is_told_as_the_node_refuses_it(ros, play):
+    ros.differential('lsd_ode')
+    process = play('--variant', 'symmetric_ode', '--wait', 60, '--duration', 20)
+    ros.until(lambda: 'refuses messages' in process.errors or process.returncode is not None)
+    told = "/differential refuses messages: ~/torques: 'pinion' is not one of carrier, front, rear"
+    assert told in process.errors
+    assert process.errors.count('refuses messages') == 1
