@@ -271,8 +271,12 @@ def run_rate(rate, arguments, folder, c_loop, beside=None):
     for process in children:
         if process.poll() is None:
             process.send_signal(signal.SIGTERM)
-    for process in children:
-        process.wait(20)
+    for process in children:   # one that was seen to spin in the middleware as it ends is killed
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
     rows = {name: read_rows(folder / name, arguments.warm_up)
             for name in ('c', 'python', 'node') if (folder / name).exists()}
     first = max(r[0, 0] for r in rows.values())
