@@ -156,8 +156,12 @@ def main():
             process.wait()
         for process in nodes:
             process.send_signal(signal.SIGTERM)
-        for process in nodes:
-            process.wait(20)
+        for process in nodes:   # as in loop.py
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
         print('| ' + ' | '.join(HEAD) + ' |\n|---|' + '---:|' * (len(HEAD) - 1))
         for transport, folder in folders.items():
             cells = row(transport, arguments.count, folder, arguments.rate)
