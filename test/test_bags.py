@@ -207,6 +207,25 @@ def cut(source, target, kept, clock=lambda time: time, topics=None):
                       types.serialize_cdr(message, connection.msgtype))
 
 
+def test_states_that_were_heard_before_the_clutches_are_left_out():
+    recorded('speeds')
+    cut('drive', 'late', lambda stamp: True, topics=('joint_states', 'torques'))
+    cut('drive', 'whole', lambda stamp: True)
+    whole = {stamp(m): m for _, m in messages('whole', '/differential/clutches')}
+    cut('drive', 'early', lambda time: time >= 60_000_000, topics=('clutches',))
+    from rosbags.highlevel import AnyReader
+    with AnyReader([Path('late')]) as a, AnyReader([Path('early')]) as b, Bag('both') as bag:
+        for reader in (a, b):
+            topics = {c.topic: bag.topic(c.topic, c.msgtype) for c in reader.connections}
+            for connection, time, data in reader.messages():
+                bag.write(topics[connection.topic], time, data)
+    mechanism = Simulation('lsd_ode', 2e-3, ports=dict.fromkeys(
+        ('front', 'rear'), (1e4, 100.0))).mechanism
+    both, all_of_it = (read_drive(name, mechanism, 500.0) for name in ('both', 'drive'))
+    assert len(whole) == 201 and len(both.table.times) == len(all_of_it.table.times) - 30
+    assert both.table.torques == all_of_it.table.torques[30:]
+
+
 def test_with_stamps_of_system_time_each_message_is_a_tick_and_what_is_late_is_told(capsys):
     arguments = recorded('lsd_ode')
     random, jitter = np.random.default_rng(1), {}

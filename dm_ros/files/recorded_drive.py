@@ -153,6 +153,11 @@ class _Drive:
                 self.commands.append((len(self.states), time, topic, message))
         while self.forces and self.states and next(reversed(self.states)) not in self.forces:
             self.states.popitem()   # the recorder ended within a tick
+        early = 0   # states that the recorder heard before it heard the clutches
+        while self.forces and self.states and next(iter(self.states)) not in self.forces:
+            del self.states[next(iter(self.states))]
+            early += 1
+        self.commands = [(max(0, seen - early), *rest) for seen, *rest in self.commands]
 
     # inputs
 
