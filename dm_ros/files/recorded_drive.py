@@ -22,7 +22,7 @@ from dm_ros.files.torque_table import TorqueTable
 from dm_ros.motion.held_inputs import HeldInputs, Joints
 
 SUFFIXES = '.mcap', '.db3'
-JITTER = 0.1     # of a tick by which the mean of stamps of system time may be off
+JITTER = 0.1     # of a tick by which the usual gap of stamps of system time may be off
 ROUNDING = 5e-3  # likewise, by which a rate that is told by them is
 LATE = 1.5       # ticks between two stamps of system time, from which on one is missing
 
@@ -230,7 +230,7 @@ class _Drive:
                 if topic == 'torques' and self._take(held, topic, message, 0):
                     rows.append(held.in_force(0))
             if len(rows) in (count, count + 1):   # each was a tick: it is lockstep
-                return self._plain(held, rows[:count])
+                return self._as_in_tables(held, rows[:count])
         held, rows, commands = self._held(timeout * rate), [], deque(self.commands)
         starts = len(self.states) > count   # the first state is no tick
         for tick in range(count):
@@ -238,7 +238,7 @@ class _Drive:
                 _, _, topic, message = commands.popleft()
                 self._take(held, topic, message, tick)
             rows.append(held.in_force(tick))
-        return self._plain(held, rows)
+        return self._as_in_tables(held, rows)
 
     def _of_commands(self):
         """Return the drive of a bag without joint_states: commands by the time they came."""
@@ -256,8 +256,8 @@ class _Drive:
         gap = median(after - before for before, after in pairwise(times))
         rate = next(_plain(1e9 / gap))
         return RecordedDrive(
-            self._table([(time - times[0]) * 1e-9 for time in times], self._plain(held, rows)),
-            1 / rate, {},
+            self._table([(time - times[0]) * 1e-9 for time in times],
+                        self._as_in_tables(held, rows)), 1 / rate, {},
             (f'without {self.node}/joint_states what was commanded is taken, when it came',), {})
 
     def _held(self, timeout):
@@ -275,7 +275,7 @@ class _Drive:
             return False
         return True
 
-    def _plain(self, held, rows):
+    def _as_in_tables(self, held, rows):
         """Return the rows as those of a table: without forces, where none ever came."""
         silent, count = held.silent(), len(self._mechanism.ports)
         if free := [shaft for shaft in self._mechanism.half_shafts if shaft in silent]:

@@ -5,6 +5,8 @@
 
 from xml.etree.ElementTree import Comment, SubElement
 
+from dm_ros.mechanism.variants import MECHANISMS
+
 PLUGIN = 'joint_state_topic_hardware_interface/JointStateTopicSystem'
 STATES = 'position', 'velocity', 'effort'   # all that a message has must be declared
 ALWAYS = '-1'   # threshold; by default a torque that is in force is not sent again: it grows stale
@@ -23,9 +25,8 @@ def controllers_file(mechanism, prefix='', lockstep=False):
     if mechanism.half_shafts:   # once claimed, an effort is never NaN again: all is refused
         raise ValueError(f'ros2_control: with a speed port ({", ".join(mechanism.half_shafts)}) '
                          'it must be a file in which no controller claims the effort of its joint')
-    if mechanism.actuators and mechanism.name == 'symmetric' and not lockstep:
-        return 'symmetric_clutches_controllers.yaml'
-    return f'{mechanism.name}_controllers.yaml'
+    added = mechanism.actuators and not MECHANISMS[mechanism.name].actuators and not lockstep
+    return f'{mechanism.name}{"_clutches" if added else ""}_controllers.yaml'
 
 
 def system(robot, name, joints, commands, **parameters):

@@ -81,6 +81,8 @@ def complex_phi_2(a, b):
         for start in (1 / 120, 1 / 24, 1 / 6, 1 / 2):
             p, q = start + (a * p - b * q), a * q + b * p
         return p, q
+    if math.isinf(b):   # of which there is no cosine
+        raise OverflowError('a mode swings too fast')
     growth = math.exp(min(a, STEEPEST))
     p, q = growth * math.cos(b) - 1.0 - a, growth * math.sin(b) - b
     c, d = a * a - b * b, 2.0 * a * b   # z^2

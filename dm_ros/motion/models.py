@@ -56,7 +56,7 @@ def no_solution(parameters):
 class Booked(NamedTuple):
     """What the elements lost along the path of a step, and what its error took, J."""
 
-    lost: tuple        # in the order of ``passive.lost_powers``
+    lost: tuple        # in the order of ``passive.lost_powers``, or of ``losses``
     numerical: float
 
 

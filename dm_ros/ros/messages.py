@@ -8,6 +8,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int8
 
+from dm_ros.files.bag import OUTPUT_DEPTH
 from dm_ros.files.published import Published
 
 OUTPUT_QOS = QoSProfile(depth=10)   # reliable, so that every subscriber hears it
@@ -17,7 +18,7 @@ SHARED_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 # in lockstep nothing may be lost: not a tick, not its answer
 LOCKSTEP_INPUT_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-LOCKSTEP_OUTPUT_QOS = QoSProfile(depth=10_000)
+LOCKSTEP_OUTPUT_QOS = QoSProfile(depth=OUTPUT_DEPTH)
 
 
 class Polled(CallbackGroup):

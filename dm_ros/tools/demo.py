@@ -156,6 +156,7 @@ def run_processes(arguments, simulation, values):
                             raise RuntimeError('the differential ended before the recording')
                 # missed ticks are told once a second
                 wait(next_report(recorder), 'report of the differential', node, player)
+                node.send_signal(signal.SIGINT)   # before it misses the load, and says so
     return recorder
 
 

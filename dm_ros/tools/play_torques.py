@@ -20,7 +20,7 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 
 from dm_ros.ending import ignore_signals, run_command
-from dm_ros.files.bag import Bag
+from dm_ros.files.bag import Bag, INPUT_DEPTH
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.published import CommandMessage
 from dm_ros.files.recorded_drive import is_bag, read_drive
@@ -119,7 +119,7 @@ class Player:
         self._differential, self._told = full_name(node, target), False
         self._diagnostics = node.create_subscription(
             DiagnosticArray, '/diagnostics', never_called, 10, callback_group=Polled())
-        reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+        reliable = QoSProfile(depth=INPUT_DEPTH, reliability=ReliabilityPolicy.RELIABLE)
         self._publisher = node.create_publisher(JointState, topic_of(target), reliable)
         self._idle, self._commands = [port.idle for port in ports], CommandMessage(ports, prefix)
         self._message = JointState(name=self._commands.names)
