@@ -59,6 +59,8 @@ class Page:
             if data['emptied']:
                 self.rows = []
             self.rows += data['rows']
+        if name == 'scene' and data.get('variant') not in (None, self.variant):
+            self.last.pop('ticks', None)   # those were of another node
         self.last[name] = data
         self.history.put((name, data))
 
