@@ -1,0 +1,48 @@
+/* Copyright 2026 dm_ros developers
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Exact steps of a symmetric differential, which is linear while no sign changes: see
+ * dm_ros/motion/held_torque.py and patterns.py.
+ */
+
+#ifndef DM_ROS_LINEAR_H
+#define DM_ROS_LINEAR_H
+
+#include "passive.h"
+
+/* The accelerations A x + B T and the moments (M_F, M_1, M_2) = P x + Q T, in x = (w, s). */
+typedef struct {
+    double A[2][2], B[2][3], P[3][2], Q[3][3];
+} response;
+
+/* In the order of losses.SymmetricLosses. */
+typedef struct {
+    double drag_w, drag_s, pinion_w, carrier_w, carrier_s, mesh_F, mesh_1, mesh_2;
+    double pinion_F, pinion_T, pinion_L, carrier_1, carrier_2, carrier_F, carrier_L;
+} losses_without_clutches;
+
+/* What is exact for one response and one length of step. */
+typedef struct {
+    double step[4][5];   /* rows of w and s, then of their integrals; of (w, s, T_3, T_1, T_2) */
+    double moments[3][5];
+    losses_without_clutches lost;
+    double second[9];    /* of quadrature.second_moment_of_the_way */
+} linear;
+
+/* An exact step of the passive law, and what must hold on its way. */
+typedef struct {
+    linear exact;
+    double slope[2][5], kept[7][6], input_sign, reach[2];
+    int key, is_none;    /* none: these signs have no exact step */
+} pattern;
+
+/* The patterns that a model has met, in as much room as there is; all zero at first. */
+typedef struct {
+    int room, met;
+    pattern *kept;
+} patterns;
+
+/* Make what is exact; return 0 where it leaves the range of numbers. */
+int dm_make_linear(linear *, const response *, const losses_without_clutches *, double h);
+
+#endif
