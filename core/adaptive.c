@@ -41,27 +41,32 @@ int dm_advance(step *job, pair y)
     int booked = 0;
     job->broken = job->coarse = 0;
     const law *law = job->law;
-    point here = law->evaluate(job, w, s), there;
-    slopes at_start = law->jacobian(job, &here), at_end = at_start;
+    const point *here = job->start;
+    if (!here) {
+        law->evaluate(job, w, s, &job->points[0]);
+        here = &job->points[0];
+    }
+    point *there = &job->points[here == &job->points[0]];
+    slopes at_start = law->jacobian(job, here), at_end = at_start;
     for (int n = 0; n < law->most_trials; n++) {
         const matrix J = at_start.J;
-        const double f_w = here.e_0, f_s = here.e_s;
+        const double f_w = here->e_0, f_s = here->e_s;
         const double z_ww = h * J.ww, z_ws = h * J.ws, z_sw = h * J.sw, z_ss = h * J.ss;
         const pair v = dm_apply_phi_2(job, z_ww, z_ws, z_sw, z_ss, f_w, f_s);
         const double d_w = h * (f_w + z_ww * v.w + z_ws * v.s);
         const double d_s = h * (f_s + z_sw * v.w + z_ss * v.s);
-        there = law->evaluate(job, w + d_w, s + d_s);
+        law->evaluate(job, w + d_w, s + d_s, there);
         double i_w = h * (w + h * v.w), i_s = h * (s + h * v.s);
-        const pair c = nonlinear_part(job, &here, &there, J, h, d_w, d_s);
+        const pair c = nonlinear_part(job, here, there, J, h, d_w, d_s);
         const double allowed = job->tolerance + law->relative * (fabs(d_w) + fabs(d_s));
         double error = quotient(job, fabs(c.w) + fabs(c.s), allowed);
         int is_known = 0;
         if (error <= 1.0) {
-            there = law->evaluate(job, w + d_w + c.w, s + d_s + c.s);
-            if (law->bends(job, &here, &there)) {
-                at_end = law->jacobian(job, &there);
+            law->evaluate(job, w + d_w + c.w, s + d_s + c.s, there);
+            if (law->bends(job, here, there)) {
+                at_end = law->jacobian(job, there);
                 is_known = 1;
-                const pair r = nonlinear_part(job, &there, &here, at_end.J, -h, -d_w - c.w,
+                const pair r = nonlinear_part(job, there, here, at_end.J, -h, -d_w - c.w,
                                               -d_s - c.s);
                 const double seen = quotient(job, fabs(r.w) + fabs(r.s), BACKWARD * allowed);
                 if (seen > error)
@@ -74,11 +79,11 @@ int dm_advance(step *job, pair y)
             i_w += h * c.w / 4;
             i_s += h * c.s / 4;
             book(job, !booked++, &(part){{w, s}, {f_w, f_s}, at_start, h, {d_w, d_s}, c,
-                                         {i_w, i_s}, 0, &here, &there});
+                                         {i_w, i_s}, 0, here, there});
             angle_w += i_w;
             angle_s += i_s;
-            w += d_w + c.w;
-            s += d_s + c.s;
+            w = w + d_w + c.w;
+            s = s + d_s + c.s;
             left -= h;
             if (left <= 0.0) {
                 job->end = (pair){w, s};
@@ -86,8 +91,9 @@ int dm_advance(step *job, pair y)
                 job->at_end = there;
                 return job->broken ? -1 : 0;
             }
-            at_start = is_known ? at_end : law->jacobian(job, &there);
+            at_start = is_known ? at_end : law->jacobian(job, there);
             here = there;
+            there = &job->points[here == &job->points[0]];
         }
         double scale = error > 1e-3 ? SAFETY * pow(error, -1.0 / 3) : GROW;
         scale = scale > SHRINK ? scale : SHRINK;
@@ -105,11 +111,11 @@ int dm_advance(step *job, pair y)
             h /= 2.0;
             continue;
         }
-        there = law->evaluate(job, end.w, end.s);
+        law->evaluate(job, end.w, end.s, there);
         const double d_w = end.w - w, d_s = end.s - s;
         const pair f = {quotient(job, d_w, h), quotient(job, d_s, h)};
         book(job, !booked++, &(part){{w, s}, f, at_start, h, {d_w, d_s}, {0.0, 0.0}, turned, 1,
-                                     &here, &there});
+                                     here, there});
         angle_w += turned.w;
         angle_s += turned.s;
         left -= h;
@@ -123,7 +129,8 @@ int dm_advance(step *job, pair y)
         w = end.w;
         s = end.s;
         here = there;
-        at_start = law->jacobian(job, &here);
+        there = &job->points[here == &job->points[0]];
+        at_start = law->jacobian(job, here);
         h = left < 2.0 * h ? left : 2.0 * h;
     }
     return -1;

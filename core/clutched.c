@@ -32,7 +32,7 @@ static pair solve_moments(step *job, pair z, const clutched_coefficients *k, pai
     return best;
 }
 
-static point evaluate(step *job, double w, double s)
+static void evaluate(step *job, double w, double s, point *at)
 {
     const clutched_coefficients *k = job->coefficients;
     const double *u = job->u;
@@ -58,10 +58,16 @@ static point evaluate(step *job, double w, double s)
     }
     F_1 += x_1 * M_1;
     F_2 += x_2 * M_2;
-    return (point){
-        .e_0 = u[B_W] + k->A_ww * w + k->A_ws * s - k->C_w1 * F_1 - k->C_w2 * F_2,
-        .e_s = u[B_S] + k->A_sw * w + k->A_ss * s - k->C_s1 * F_1 - k->C_s2 * F_2,
-        .F_1 = F_1, .F_2 = F_2, .M_1 = M_1, .M_2 = M_2, .state = {t_1, t_2, x_1, x_2}};
+    at->e_0 = u[B_W] + k->A_ww * w + k->A_ws * s - k->C_w1 * F_1 - k->C_w2 * F_2;
+    at->e_s = u[B_S] + k->A_sw * w + k->A_ss * s - k->C_s1 * F_1 - k->C_s2 * F_2;
+    at->F_1 = F_1;
+    at->F_2 = F_2;
+    at->M_1 = M_1;
+    at->M_2 = M_2;
+    at->state[0] = t_1;
+    at->state[1] = t_2;
+    at->state[2] = x_1;
+    at->state[3] = x_2;
 }
 
 static slopes jacobian(step *job, const point *at)
@@ -89,6 +95,35 @@ static slopes jacobian(step *job, const point *at)
                      k->A_ss - k->C_s1 * F_1s - k->C_s2 * F_2s}, {F_1w, F_1s, F_2w, F_2s}};
 }
 
+static void torque_slopes(step *job, const point *at, double *of_w, double *of_s)
+{
+    const clutched_coefficients *k = job->coefficients;
+    const double x_1 = at->state[2], x_2 = at->state[3];
+    const double a = 1 + x_1 * k->W_11, b = x_1 * k->W_12, c = x_2 * k->W_21;
+    const double d = 1 + x_2 * k->W_22;
+    const double det = a * d - b * c;
+    const double of_port[3][4] = {{k->B_w0, k->B_s0, k->Q_10, k->Q_20},
+                                  {k->B_w1, k->B_s1, k->Q_11, k->Q_21},
+                                  {k->B_w2, k->B_s2, k->Q_12, k->Q_22}};
+    for (int n = 0; n < 3; n++) {
+        const double Q_1 = of_port[n][2], Q_2 = of_port[n][3];
+        const double F_1 = quotient(job, d * x_1 * Q_1 - b * x_2 * Q_2, det);
+        const double F_2 = quotient(job, a * x_2 * Q_2 - c * x_1 * Q_1, det);
+        of_w[n] = of_port[n][0] - k->C_w1 * F_1 - k->C_w2 * F_2;
+        of_s[n] = of_port[n][1] - k->C_s1 * F_1 - k->C_s2 * F_2;
+    }
+}
+
+void dm_clutched_held(const clutched_coefficients *k, const double *T, const double *S, double *u)
+{
+    u[B_W] = k->B_w0 * T[0] + k->B_w1 * T[1] + k->B_w2 * T[2];
+    u[B_S] = k->B_s0 * T[0] + k->B_s1 * T[1] + k->B_s2 * T[2];
+    u[M_ONE] = k->Q_10 * T[0] + k->Q_11 * T[1] + k->Q_12 * T[2];
+    u[M_TWO] = k->Q_20 * T[0] + k->Q_21 * T[1] + k->Q_22 * T[2];
+    u[S_1] = S[0];
+    u[S_2] = S[1];
+}
+
 static int always(const step *job, const point *here, const point *there)
 {
     (void)job;
@@ -100,12 +135,16 @@ static int always(const step *job, const point *here, const point *there)
 /* Of a context: w_0 is the carrier speed at the start, slip what its slope is taken times. */
 static double carrier(const context *f, double slip)
 {
-    return f->w_0 + f->slip * evaluate(f->job, f->w_0, slip).e_0;
+    point at;
+    evaluate(f->job, f->w_0, slip, &at);
+    return f->w_0 + f->slip * at.e_0;
 }
 
 static double slip_residual(const context *f, double slip)
 {
-    return slip - f->s_0 - f->h * evaluate(f->job, carrier(f, slip), slip).e_s;
+    point at;
+    evaluate(f->job, carrier(f, slip), slip, &at);
+    return slip - f->s_0 - f->h * at.e_s;
 }
 
 static int backward_euler(step *job, pair y, matrix J, double h, pair *end, pair *integral)
@@ -121,8 +160,9 @@ static int backward_euler(step *job, pair y, matrix J, double h, pair *end, pair
 }
 
 const law dm_clutched = {
-    200, 1e-6, evaluate, jacobian, always, backward_euler, dm_clutched_book,
+    200, 1e-6, evaluate, jacobian, torque_slopes, always, backward_euler, dm_clutched_book,
 };
 const law dm_clutched_symmetric = {
-    200, 1e-6, evaluate, jacobian, always, backward_euler, dm_clutched_symmetric_book,
+    200, 1e-6, evaluate, jacobian, torque_slopes, always, backward_euler,
+    dm_clutched_symmetric_book,
 };

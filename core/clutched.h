@@ -36,6 +36,9 @@ typedef struct {
 /* The laws differ by their books alone. */
 extern const law dm_clutched, dm_clutched_symmetric;
 
+/* Put what is held in a step, under torques and friction, into u. */
+void dm_clutched_held(const clutched_coefficients *, const double *T, const double *S, double *u);
+
 void dm_clutched_book(step *job, const part *path, double *lost, double *taken);
 void dm_clutched_symmetric_book(step *job, const part *path, double *lost, double *taken);
 

@@ -90,7 +90,8 @@ static products book(step *job, const part *path, double *taken)
     } else {   /* by Simpson's rule */
         const double e = h / 6, m = h * 2 / 3;
         double w_m = ways[0].w + c_w / 8, s_m = ways[0].s + c_s / 8;
-        const point at = job->law->evaluate(job, w + w_m, s + s_m);
+        point at;
+        job->law->evaluate(job, w + w_m, s + s_m, &at);
         const double F_1m = m * (at.F_1 - F_1 - F_1w * w_m - F_1s * s_m);
         const double F_2m = m * (at.F_2 - F_2 - F_2w * w_m - F_2s * s_m);
         F_1r = e * F_1r;

@@ -63,9 +63,12 @@ typedef struct {
     double h, tolerance;
     double form[3];             /* of the kinetic energy: m_ww, m_ws, m_ss */
     int has_books;
+    const point *start;         /* what is known where the step begins, or NULL */
+    const double *seen;         /* the state of a point that was seen, or NULL */
     int broken;   /* a number was divided by zero, which ends the step as it does in Python */
     pair end, integral;
-    point at_end;
+    const point *at_end;        /* one of those here */
+    point points[2];
     int coarse;
     double lost[LOST], numerical;
 } step;
@@ -74,8 +77,10 @@ typedef struct {
 struct law {
     int most_trials;
     double relative;
-    point (*evaluate)(step *, double w, double s);
+    void (*evaluate)(step *, double w, double s, point *at);
     slopes (*jacobian)(step *, const point *);
+    /* Put what dw/dt, and what ds/dt, grows with per torque on each port into of_w and of_s. */
+    void (*torque_slopes)(step *, const point *, double *of_w, double *of_s);
     int (*bends)(const step *, const point *here, const point *there);
     /* Put y and its integral after a step into end and integral; return 0 where none is found. */
     int (*last_resort)(step *, pair y, matrix J, double h, pair *end, pair *integral);

@@ -49,6 +49,7 @@ typedef struct {
     double x[2], turned[2], origin[SHAFTS], torque[PORTS], flow, memory[CLUTCHES];
     double force[CLUTCHES], held[PORTS];
     double ticks, coarse_steps;
+    double seen[STATE];   /* of the last point of the passive law: what need not be found again */
 } state;
 
 /* What a differential reports at the end of a tick, as state.Snapshot. */
@@ -56,9 +57,20 @@ typedef struct {
     double velocity[SHAFTS], position[SHAFTS], moment[MOMENTS];
 } report;
 
+enum { ENTRIES = 14, RETURNING = 5 };   /* of the books, at most */
+
+/* The books of the ticks, as in motion/books.py. */
+typedef struct {
+    double tick[ENTRIES], total[ENTRIES], stored, changes, worst;
+    double returned_ticks[RETURNING], returned[RETURNING];
+} books;
+
 /* How many there are of each in a model. */
 int dm_shafts(const model *);
 int dm_moments(const model *);
+int dm_gears(const model *);
+int dm_bearings(const model *);
+int dm_entries(const model *);
 
 /*
  * Make a model of parameters, which are the numbers of the table of its mechanism in its order
@@ -73,15 +85,26 @@ void dm_reset(const model *, state *, const double *velocity);
 /* Go on under another model: the speeds of the output shafts and all angles stay. */
 void dm_adopt(const model *before, const model *after, state *);
 
+/* Begin the books at a state; or note that it has become another one without any work. */
+void dm_begin_books(const model *, const state *, books *);
+void dm_note_change(const model *, const state *, books *);
+
+/* Add a solver step to the entries of a tick, and a tick to the books. */
+void dm_book_step(const model *, int is_first, const double *x, const pair *end,
+                  const double *work, const double *lost, double numerical, double *tick);
+void dm_book_tick(const model *, const state *, const double *tick, books *);
+
 /*
  * Advance one tick.
  * torques: N m, finite. forces: N, finite, at least 0; NULL without clutches.
  * known: the patterns of this model that were met, as many as there is room for; see linear.h.
+ * kept: the books, or NULL. told: what is reported after the tick, or NULL.
  * Return 0, or -1 where that leads out of the range of numbers: the state stays what it was.
  */
-int dm_tick(const model *, state *, patterns *known, const double *torques, const double *forces);
+int dm_tick(const model *, state *, patterns *known, const double *torques, const double *forces,
+            books *kept, report *told);
 
-/* Put what is reported after a tick, or at the start, into a report. */
-void dm_report(const model *, const state *, patterns *known, report *);
+/* Put what is reported after the last tick, or at the start, into told; return 0 or -1 as above. */
+int dm_report(const model *, const state *, patterns *known, report *told);
 
 #endif

@@ -32,17 +32,37 @@ typedef struct {
 /* An exact step of the passive law, and what must hold on its way. */
 typedef struct {
     linear exact;
-    double slope[2][5], kept[7][6], input_sign, reach[2];
+    double slope[2][5], kept[8][6], input_sign, reach[2];
     int key, is_none;    /* none: these signs have no exact step */
 } pattern;
 
-/* The patterns that a model has met, in as much room as there is; all zero at first. */
+/* The patterns that a model has met, in as much room as there is; what is in it changes no bit. */
 typedef struct {
-    int room, met;
+    int room, met, next, last;
     pattern *kept;
 } patterns;
 
-/* Make what is exact; return 0 where it leaves the range of numbers. */
+/* Make what is exact; return 0 where a number is divided by zero. */
 int dm_make_linear(linear *, const response *, const losses_without_clutches *, double h);
+
+/* Put x after a step, and its integral, into end and integral. */
+void dm_exact_step(const linear *, pair x, const double *T, pair *end, pair *integral);
+
+/* Put (M_F, M_1, M_2), as they are reported, into moments. */
+void dm_exact_moments(const linear *, pair x, const double *T, double *moments);
+
+/* Put the work on the ports, and what the elements lost, into work and lost, J. */
+void dm_exact_book(const linear *, double g_F, double h, pair x, pair end, pair integral,
+                   const double *T, double *work, double *lost);
+
+/* Return whether the carrier and the outputs are so fast that every sigma is 1 or -1. */
+int dm_has_pattern(const coefficients *, pair x);
+
+/* Return the pattern at a point where all is fast, NULL where there is none. */
+const pattern *dm_pattern_at(patterns *known, const coefficients *, double h, double T_in,
+                             const point *);
+
+/* As dm_exact_step; return 0 where a sign may not hold all the way. */
+int dm_pattern_step(const pattern *, pair x, const double *T, pair *end, pair *integral);
 
 #endif

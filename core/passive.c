@@ -4,17 +4,22 @@
  * The equations of the passive law: see dm_ros/mechanism/passive.py.
  */
 
+#include <string.h>
+
 #include "passive.h"
 
 static const double STRAIGHT = 0.02;
 enum { ROUNDS = 8, NEWTON = 30 };
 
-/* Solve the equations at given signs; return by how much the solution disagrees with them. */
-static double solve(step *job, double q_1, double q_2, const double *state, signs sign,
-                    signs *found, point *result)
+/*
+ * Solve the equations at given signs, in the state of the result; return by how much the solution
+ * disagrees with them.
+ */
+static double solve(step *job, double q_1, double q_2, signs sign, signs *found, point *result)
 {
     const coefficients *k = job->coefficients;
     const double T_in = job->u[T_IN], S_1 = job->u[S_ONE], S_2 = job->u[S_TWO];
+    const double *state = result->state;
     const double w = state[0], s = state[1], sigma_0 = state[2], sigma_1 = state[3];
     const double sigma_2 = state[4], t_1 = state[5], t_2 = state[6];
     const double s_1 = sign.s_1, s_2 = sign.s_2, s_F = sign.s_F, h_N = sign.h_N, b = sign.b;
@@ -79,11 +84,18 @@ static double solve(step *job, double q_1, double q_2, const double *state, sign
         bracket -= C;
     if (w == 0.0)
         N = 0.0;
-    *result = (point){
-        e_0, e_s, F_1 + F_1x, F_2 + F_2x, M_1, M_2, M_F, sign,
-        {w, s, sigma_0, sigma_1, sigma_2, t_1, t_2},
-        {n_1, n_2, p_1, p_2, m_1, m_2, y_1, y_2, X, a_N, a_X, inertia, G_11, G_12, G_21, G_22,
-         det}};
+    result->e_0 = e_0;
+    result->e_s = e_s;
+    result->F_1 = F_1 + F_1x;
+    result->F_2 = F_2 + F_2x;
+    result->M_1 = M_1;
+    result->M_2 = M_2;
+    result->M_F = M_F;
+    result->sign = sign;
+    double *v = result->solved;
+    v[0] = n_1, v[1] = n_2, v[2] = p_1, v[3] = p_2, v[4] = m_1, v[5] = m_2, v[6] = y_1;
+    v[7] = y_2, v[8] = X, v[9] = a_N, v[10] = a_X, v[11] = inertia, v[12] = G_11, v[13] = G_12;
+    v[14] = G_21, v[15] = G_22, v[16] = det;
     if (M_1 * s_1 >= 0.0 && M_2 * s_2 >= 0.0 && M_F * s_F >= 0.0
         && (h_N != 0.0 ? N >= 0.0 : N <= 0.0) && (b != 0.0 ? bracket >= 0.0 : bracket <= 0.0)) {
         *found = sign;
@@ -100,37 +112,53 @@ static double solve(step *job, double q_1, double q_2, const double *state, sign
     return wrong;
 }
 
-static point evaluate(step *job, double w, double s)
+/* Put w, s and the tanh of each sign into state, or what is known of the same speeds. */
+static void find_state(step *job, double w, double s, double *state)
+{
+    const coefficients *k = job->coefficients;
+    const double speeds[2] = {w, s}, k_1s = k->k_1 * s, k_2s = k->k_2 * s;
+    if (job->seen && !memcmp(job->seen, speeds, sizeof speeds)) {
+        memcpy(state, job->seen, STATE * sizeof *state);
+        return;
+    }
+    state[0] = w;
+    state[1] = s;
+    state[2] = tanh(quotient(job, w, k->sign_speed));
+    state[3] = tanh(quotient(job, w + k_1s, k->sign_speed));
+    state[4] = tanh(quotient(job, w - k_2s, k->sign_speed));
+    state[5] = tanh(k->a_1 * s);
+    state[6] = tanh(k->a_2 * s);
+}
+
+static void evaluate(step *job, double w, double s, point *at)
 {
     const coefficients *k = job->coefficients;
     const double *u = job->u;
     const double k_1s = k->k_1 * s, k_2s = k->k_2 * s;
-    const double t_1 = tanh(k->a_1 * s), t_2 = tanh(k->a_2 * s);
-    const double state[STATE] = {
-        w, s, tanh(quotient(job, w, k->sign_speed)), tanh(quotient(job, w + k_1s, k->sign_speed)),
-        tanh(quotient(job, w - k_2s, k->sign_speed)), t_1, t_2};
+    find_state(job, w, s, at->state);
+    const double t_1 = at->state[5], t_2 = at->state[6];
     const double q_1 = u[S_ONE] * t_1 + k->l_1 * k_1s - u[T_ONE];
     const double q_2 = u[S_TWO] * t_2 - k->l_2 * k_2s - u[T_TWO];
     const double both = q_1 + q_2;
     signs sign = {q_1 >= 0.0 ? 1.0 : -1.0, q_2 >= 0.0 ? 1.0 : -1.0, both >= 0.0 ? 1.0 : -1.0,
                   both * w > 0.0 ? 1.0 : 0.0, 1.0}, found;
-    point here, best;
     for (int n = 0; n < ROUNDS; n++) {
-        if (solve(job, q_1, q_2, state, sign, &found, &here) == 0.0)
-            return here;
+        if (solve(job, q_1, q_2, sign, &found, at) == 0.0)
+            return;
         sign = found;
     }
+    point best = *at;
     double least = 0.0;
     for (int n = 0; n < 32; n++) {
         sign = (signs){n & 16 ? -1.0 : 1.0, n & 8 ? -1.0 : 1.0, n & 4 ? -1.0 : 1.0,
                        n & 2 ? 0.0 : 1.0, n & 1 ? 0.0 : 1.0};
-        const double wrong = solve(job, q_1, q_2, state, sign, &found, &here);
+        const double wrong = solve(job, q_1, q_2, sign, &found, at);
         if (n == 0 || wrong < least) {
             least = wrong;
-            best = here;
+            best = *at;
         }
     }
-    return best;
+    *at = best;
 }
 
 static slopes jacobian(step *job, const point *at)
@@ -194,6 +222,34 @@ static slopes jacobian(step *job, const point *at)
                      quotient(job, G_21 * g_s - G_11 * r_s, det)}, {0.0}};
 }
 
+static void torque_slopes(step *job, const point *at, double *of_w, double *of_s)
+{
+    const coefficients *k = job->coefficients;
+    const double T_in = job->u[T_IN], s_F = at->sign.s_F;
+    const double w = at->state[0], sigma_0 = at->state[2];
+    const double *v = at->solved;
+    const double n_1 = v[0], n_2 = v[1], p_1 = v[2], p_2 = v[3], y_1 = v[6], y_2 = v[7];
+    const double a_X = v[10], G_11 = v[12], G_12 = v[13], G_21 = v[14], G_22 = v[15];
+    const double det = v[16];
+    double drive = T_in * w < 0.0 ? a_X : 1.0;
+    if (k->g_F != 0.0) {
+        const double h = k->half_F * sigma_0 * s_F, beta_3 = k->bearing_3 * fabs(sigma_0);
+        const int drives = w * s_F > 0.0;
+        const double a_P = drives ? 1 + beta_3 : 1.0, a_C = drives ? 1.0 : a_X;
+        drive = quotient(job, a_C * (k->mean_F - h) * k->g_F, a_P * (k->mean_F + h));
+        if (T_in * k->g_F * w < 0.0)
+            drive *= 1 + beta_3;
+    }
+    const double R[3][2] = {
+        {drive, 0.0},
+        {quotient(job, y_1, p_1), quotient(job, k->g_12 * n_1, p_1)},
+        {quotient(job, y_2, p_2), quotient(job, -n_2, p_2)}};
+    for (int n = 0; n < 3; n++) {
+        of_w[n] = quotient(job, R[n][0] * G_22 - R[n][1] * G_12, det);
+        of_s[n] = quotient(job, G_11 * R[n][1] - G_21 * R[n][0], det);
+    }
+}
+
 static int bends(const step *job, const point *here, const point *there)
 {
     const coefficients *k = job->coefficients;
@@ -249,7 +305,9 @@ void dm_lost_powers(const step *job, const point *at, double *lost)
 
 static double carrier_residual(const context *f, double w)
 {
-    return w - f->w_0 - f->h * evaluate(f->job, w, f->slip).e_0;
+    point at;
+    evaluate(f->job, w, f->slip, &at);
+    return w - f->w_0 - f->h * at.e_0;
 }
 
 /* Return the carrier speed that fits a slip, NaN where none does, which no root survives. */
@@ -264,14 +322,17 @@ static double carrier(const context *f, double slip)
 
 static double slip_residual(const context *f, double slip)
 {
-    return slip - f->s_0 - f->h * evaluate(f->job, carrier(f, slip), slip).e_s;
+    point at;
+    evaluate(f->job, carrier(f, slip), slip, &at);
+    return slip - f->s_0 - f->h * at.e_s;
 }
 
 /* Return whether y_end = y + h f(y_end), but for what a root leaves where f is steep. */
 static int solved(step *job, pair y, pair end, double h)
 {
     const double d_w = end.w - y.w, d_s = end.s - y.s;
-    const point at = evaluate(job, end.w, end.s);
+    point at;
+    evaluate(job, end.w, end.s, &at);
     return fabs(d_w - h * at.e_0) + fabs(d_s - h * at.e_s)
         <= 1e-4 + 1e-6 * (fabs(d_w) + fabs(d_s));
 }
@@ -280,7 +341,8 @@ static int newton(step *job, pair y, double h, pair *end)
 {
     double w = y.w, s = y.s;
     for (int n = 0; n < NEWTON; n++) {
-        const point at = evaluate(job, w, s);
+        point at;
+        evaluate(job, w, s, &at);
         const matrix J = jacobian(job, &at).J;
         const double r_w = w - y.w - h * at.e_0, r_s = s - y.s - h * at.e_s;
         const double a = 1 - h * J.ww, b = -h * J.ws, c = -h * J.sw, d = 1 - h * J.ss;
@@ -322,5 +384,5 @@ static int implicit_euler(step *job, pair y, matrix J, double h, pair *end, pair
 }
 
 const law dm_passive = {
-    400, 1e-12, evaluate, jacobian, bends, implicit_euler, dm_passive_book,
+    400, 1e-12, evaluate, jacobian, torque_slopes, bends, implicit_euler, dm_passive_book,
 };

@@ -40,7 +40,8 @@ void dm_passive_book(step *job, const part *path, double *lost, double *taken)
         const double r_2 = nodes->r_2[i], r_3 = nodes->r_3[i], weight = nodes->weight[i];
         w = w_0 + q_w + c_w * r_3;
         s = s_0 + q_s + c_s * r_3;
-        const point at = dm_passive.evaluate(job, w, s);
+        point at;
+        dm_passive.evaluate(job, w, s, &at);
         error_w = f_w + J.ww * q_w + J.ws * q_s + 3 * c_w * r_2 / h - at.e_0;
         error_s = f_s + J.sw * q_w + J.ss * q_s + 3 * c_s * r_2 / h - at.e_s;
         sum += weight * ((m_ww * w + m_ws * s) * error_w + (m_ws * w + m_ss * s) * error_s);

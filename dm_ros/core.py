@@ -6,13 +6,11 @@ The ticks in C, where they are built: ``language`` is what is in use, ``'C'`` or
 
 Both give the same bits; Python is the reference, and what is left where there was no compiler.
 The environment variable ``DM_ROS_CORE`` chooses, ``c`` or ``python``; without it C is taken where
-it is built. In C are the adaptive steps under both laws, on torques, with their books.
+it is built. In C are whole ticks of both mechanisms under both laws, on torques, with their books.
 """
 
-import dataclasses
 from importlib import import_module
 import os
-import struct
 
 CHOICE = 'DM_ROS_CORE'
 
@@ -31,11 +29,4 @@ def _chosen(choice):
 
 _module = _chosen(os.environ.get(CHOICE, ''))
 language = 'C' if _module else 'Python'
-STEPS = 'passive_step', 'paper_step'   # each None where Python does it
-passive_step, paper_step = (getattr(_module, name, None) for name in STEPS)
-
-
-def packed(*tables):
-    """Return the numbers of dataclasses of floats, one after the other, as C has them."""
-    values = [value for table in tables for value in dataclasses.astuple(table)]
-    return struct.pack(f'{len(values)}d', *values)
+Ticker = getattr(_module, 'Ticker', None)   # None where Python does it

@@ -158,12 +158,12 @@ class Plant:
         """
         held, shafts = self.inputs.in_force(self.simulation.ticks), self._shafts
         forces = held[shafts:]
+        self.ticks += 1
         try:
-            self.simulation.advance(held[:shafts], forces if any(forces) else NO_FORCE)
+            return self.simulation.step(held[:shafts], forces if any(forces) else NO_FORCE)
         except ValueError as error:
             self.out_of_range.happened(str(error))
-        self.ticks += 1
-        return self.simulation.snapshot()
+            return self.simulation.snapshot()
 
     def reset(self):
         """Go back to the start, without any demand; parameters stay."""

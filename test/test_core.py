@@ -5,14 +5,17 @@
 
 import os
 from pathlib import Path
+import struct
 import subprocess
 import sys
 
+import numpy as np
 from properties import Twins
 import pytest
 
-from dm_ros import core
+from dm_ros import core, Simulation
 from dm_ros.motion.models import LOSS_LAWS
+from dm_ros.motion.packing import packed
 
 ROOT = Path(__file__).parents[1]
 built = pytest.mark.skipif(core._chosen('') is None, reason='the core in C is not built')
@@ -28,9 +31,7 @@ def python(*arguments, **environment):
 @built
 @pytest.mark.parametrize('clutched', [False, True])
 @pytest.mark.parametrize('loss_law', LOSS_LAWS)
-def test_c_and_python_give_the_same_bits_on_random_mechanisms(loss_law, clutched, monkeypatch):
-    for name in core.STEPS:
-        monkeypatch.setattr(core, name, getattr(core._chosen(''), name))
+def test_c_and_python_give_the_same_bits_on_random_mechanisms(loss_law, clutched):
     twins = Twins(loss_law, clutched)
     for n in range(150):
         twins.run(n)
@@ -69,25 +70,39 @@ def test_a_build_without_a_compiler_ends_well(tmp_path):
 
 
 @built
-def test_numbers_that_are_none_are_refused():
-    passive = bytes(8 * 29), (0.0,) * 5, (0.0, 0.0), 1e-3, 1e-4, (0.0,) * 3
-    paper = (bytes(8 * 34), bytes(8 * 10), (0.0,) * 6, (0.0,) * 3, (0.0, 0.0), 1e-3, 1e-4,
-             (0.0,) * 3)
-    for name, good, place, bad, words in (
-            ('passive_step', passive, 0, b'', 'coefficients must be 232 bytes, not 0'),
-            ('passive_step', passive, 1, (0.0,), 'u must be a tuple of 5 numbers'),
-            ('passive_step', passive, 1, ('a',) * 5, 'must be real number'),
-            ('passive_step', passive, 2, [0.0, 0.0], 'y must be a tuple of 2'),
-            ('passive_step', passive, 5, (1.0,), 'form must be a tuple of 3'),
-            ('paper_step', paper, 0, b'', 'coefficients must be 272 bytes'),
-            ('paper_step', paper, 1, bytes(9), 'losses must be 184 bytes, not 9'),
-            ('paper_step', paper, 3, (1.0,), 'T must be a tuple of 3')):
+def test_what_is_no_model_and_no_number_is_refused(monkeypatch):
+    monkeypatch.setattr(core, 'Ticker', core._chosen('').Ticker)
+    with pytest.raises(TypeError, match='model must be [0-9]+ bytes, not 8'):
+        core.Ticker(bytes(8), False)
+    ticker = Simulation('lsd_ode')._ticker
+    assert ticker.language == 'C'
+    for name, arguments, words in (
+            ('tick', (('a',) * 3, (0.0, 0.0)), 'must be finite numbers'),
+            ('tick', ((0.0,) * 2, (0.0, 0.0)), 'must be finite numbers'),
+            ('tick', ((0.0,) * 3, (0.0, -1.0)), 'must be finite numbers'),
+            ('reset', ([0.0, 0.0],), 'velocity must be a tuple of 2 numbers'),
+            ('reset', (('a', 'b'),), 'must be real number'),
+            ('follow', (None,), 'a ticker follows a ticker')):
         with pytest.raises(TypeError, match=words):
-            getattr(core._chosen(''), name)(*good[:place], bad, *good[place + 1:])
+            getattr(ticker, name)(*arguments)
+    with pytest.raises(TypeError, match='x must be a tuple of 2 numbers'):
+        ticker.state = ticker.state._replace(x=(0.0,))
+
+
+@built
+@pytest.mark.parametrize('torques', [[1, 2, 3], np.array([1.0, 2.0, 3.0]), ('1', '2', '3'),
+                                     iter((1.0, 2.0, 3.0)), (True, np.float32(2), 3)])
+def test_c_takes_the_numbers_that_python_takes(torques, monkeypatch):
+    monkeypatch.setattr(core, 'Ticker', core._chosen('').Ticker)
+    simulation, other = Simulation('lsd_ode'), Simulation('lsd_ode')
+    assert simulation.step(torques) == other.step((1.0, 2.0, 3.0))
 
 
 @built
 def test_what_divides_by_zero_is_an_error_as_in_python():
+    lsd = Simulation('lsd_ode')._ticker
+    size = len(packed(lsd.model, lsd.run)) - 16
+    model = struct.pack('dd', 0.0, 1.0) + bytes(size)   # passive, with a mesh_sign_speed of 0
+    ticker = core._chosen('').Ticker(model, False)
     with pytest.raises(ArithmeticError):
-        core._chosen('').passive_step(bytes(8 * 29), (0.0,) * 5, (1.0, 0.0), 1e-3, 1e-4,
-                                      (0.0,) * 3)
+        ticker.report()

@@ -94,13 +94,13 @@ def test_an_unknown_law_is_refused_and_named(log):
 
 def test_a_tick_out_of_range_is_refused_and_counted_and_the_state_stays(log, monkeypatch):
     plant = Plant({'torque_limit': 1e9}, log)
-    advance = plant.simulation.advance
+    step = plant.simulation.step
 
     def bounded(torques, *forces):
         if max(map(abs, torques)) > 1e8:
             raise ValueError('out of the range of floating point numbers')
-        return advance(torques, *forces)
-    monkeypatch.setattr(plant.simulation, 'advance', bounded)
+        return step(torques, *forces)
+    monkeypatch.setattr(plant.simulation, 'step', bounded)
     before = plant.tick()
     assert plant.take(('pinion',), (1e9,), 'test')
     assert plant.tick() == before

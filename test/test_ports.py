@@ -185,7 +185,7 @@ def reference(simulation, z, inputs):
     p, names = simulation.parameters, simulation.inputs
     k_1, k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
     ends = (getattr(p, 'g_F', 1.0), 0.0), (1.0, k_1), (1.0, -k_2)
-    model, shafts = simulation._model.inner, list(simulation.ports.items())
+    model, shafts = simulation._ticker.model.inner, list(simulation.ports.items())
     S = model.friction((), (0.0, 0.0))
 
     def slope(_, z):
@@ -362,7 +362,7 @@ def test_the_books_have_twist_and_damping_and_close(variant, loss_law):
     twist = sum(c / 2 * phi**2 for (c, _), phi in zip(ports.values(), twists(audit)))
     x = audit.state.x[:2]
     assert audit.stored_energy == pytest.approx(
-        audit._meter._inner.stored_energy(x) + twist, rel=1e-12)
+        audit._ticker.books.meter._inner.stored_energy(x) + twist, rel=1e-12)
     assert audit.stored_energy - started == pytest.approx(audit.total.stored, rel=1e-9)
     if loss_law == 'passive':
         assert not any(energy for _, energy in audit.returned.values())
@@ -397,7 +397,7 @@ def test_a_tick_takes_a_bounded_number_of_parts_and_says_when_it_was_coarse(monk
 
 def test_the_last_resort_obeys_the_equations_at_its_end():
     simulation = Simulation('lsd_ode', 5e-3, ports=ports_of('lsd_ode', 1, 2))
-    model = simulation._model
+    model = simulation._ticker.model
     inputs = [120.0, 3.0, -2.0]
     equations = Equations(model._law, model.inner.coefficients_of(1), model.half_shafts, inputs,
                           model.friction((), (0.0, 0.0)))
@@ -413,7 +413,7 @@ def test_the_jacobian_is_the_slope_of_the_slope():
         for loss_law in LOSS_LAWS:
             simulation = Simulation(variant, parameters=make(rng), loss_law=loss_law,
                                     ports=ports_of(variant, 0, 1, 2))
-            model = simulation._model
+            model = simulation._ticker.model
             equations = Equations(model._law, model.inner.coefficients_of(1), model.half_shafts,
                                   (30.0, 20.0, 10.0), model.friction((), (0.0, 0.0)))
             z = equations.state(20.0, 3.0, (0.01, -0.02, 0.005))
@@ -426,7 +426,7 @@ def test_the_jacobian_is_the_slope_of_the_slope():
 
 def test_a_step_of_no_half_shaft_is_one_of_the_adaptive_kind():
     simulation = Simulation('lsd_ode', ports=ports_of('lsd_ode', 1))
-    model = simulation._model
+    model = simulation._ticker.model
     equations = Equations(model._law, model.inner.coefficients_of(1), [], [90.0, -20.0, -30.0],
                           model.friction((), (0.0, 0.0)))
     z, integral, _, coarse, _ = step(equations, equations.state(5.0, 1.0, ()), 1e-3, 1e-5,

@@ -13,7 +13,7 @@ does not have the sign that fits the direction of power flow.
 w is the speed of the carrier omega_0 and s the slip omega_1 - omega_2.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dm_ros.mechanism.power_flow import DIRECT
 
@@ -42,6 +42,11 @@ class SymmetricLosses:
     carrier_2: float
     carrier_F: float
     carrier_L: float
+
+    def of_reported(self, direction):
+        """Return those for the moments as they are reported, in one sign for both directions."""
+        return replace(self, **{name: direction * getattr(self, name) for name in (
+            'mesh_F', 'mesh_1', 'mesh_2', 'pinion_F', 'carrier_1', 'carrier_2', 'carrier_F')})
 
 
 def symmetric_losses(p, direction):

@@ -43,7 +43,7 @@ from dm_ros.mechanism.clutched import proportional_friction, slip_steepness
 from dm_ros.mechanism.efficiencies import Efficiencies
 from dm_ros.mechanism.losses import lost_in_bearing
 
-SATURATED = 19.0   # times mesh_sign_speed: above, sigma is 1 to rounding
+SATURATED = 20.0   # times mesh_sign_speed: above, sigma is 1 to rounding
 STRAIGHT = 0.02    # change of a sigma or t_k over which the equations are nearly linear
 TINY = 1e-280      # determinant, with which the range of floating point ends
 ROUNDS = 8         # of looking for the signs, before all patterns are tried

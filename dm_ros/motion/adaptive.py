@@ -219,8 +219,7 @@ def step(law, k, u, y, h, tolerance=TOLERANCE, here=None):
                           (i_w, i_s), False, here, there))
             angle_w += i_w
             angle_s += i_s
-            w += d_w + c_w
-            s += d_s + c_s
+            w, s = w + d_w + c_w, s + d_s + c_s   # where there is, to the last bit
             left -= part
             if left <= 0.0:
                 return (w, s), (angle_w, angle_s), there, False, parts

@@ -20,52 +20,12 @@ Every term is computed on its own, none is the remainder of the others:
   error; this is the work of that error, positive when it takes energy away
 """
 
-from operator import add
 from typing import NamedTuple
 
+from dm_ros.motion.books import Books, Layout, NO_LOSS
 from dm_ros.motion.coupled_meter import meter_of
 from dm_ros.motion.simulation import NO_FORCE, Simulation
 from dm_ros.motion.state import Snapshot
-
-AT_REST = 1e-6    # of the stored energy: with less turned over, its rounding is all there is
-NO_LOSS = 1e-12   # of the energy turned over in a tick: less than that, given back, is rounding
-
-
-class Layout(NamedTuple):
-    """Where the entries of a mechanism's books stand, as the meters make them."""
-
-    work: slice
-    stored: int
-    viscous: int
-    gears: slice
-    bearings: slice
-    clutches: slice
-    half_shafts: slice
-    numerical: int
-    scale: int
-
-    @classmethod
-    def of(cls, mechanism):
-        """Return the layout for a ``Mechanism``."""
-        stored = len(mechanism.ports)
-        gears = stored + 2
-        bearings = gears + len(mechanism.gears)
-        clutches = bearings + len(mechanism.bearings)
-        half_shafts = clutches + len(mechanism.clutches)
-        numerical = half_shafts + len(mechanism.half_shafts)
-        return cls(slice(0, stored), stored, stored + 1, slice(gears, bearings),
-                   slice(bearings, clutches), slice(clutches, half_shafts),
-                   slice(half_shafts, numerical), numerical, numerical + 1)
-
-    @property
-    def losses(self):
-        """Where all losses of the mechanism stand."""
-        return slice(self.viscous, self.numerical)
-
-    @property
-    def gears_and_bearings(self):
-        """Where those losses stand that may give energy back."""
-        return slice(self.gears.start, self.bearings.stop)
 
 
 class Energy(NamedTuple):
@@ -188,8 +148,6 @@ class AuditedSimulation(Simulation):
     that
 
         stored_energy = that at the start + total.stored + stored_by_changes
-
-    ``worst`` is the largest ``relative_residual`` of a tick; it may be set back to 0.0.
     """
 
     @property
@@ -212,89 +170,59 @@ class AuditedSimulation(Simulation):
         """Names of the shafts with a half-shaft, in the order of ``Energy.half_shafts``."""
         return self.mechanism.half_shafts
 
-    def prepare(self, parameters, substeps=None, ports=None):
-        model, substeps = super().prepare(parameters, substeps, ports)
-        return model, substeps, meter_of(model)
-
-    def adopt(self, prepared):
-        *prepared, self._meter = prepared
-        first = self._model is None
-        super().adopt(prepared)
-        if not first:
-            self._note_change()
-
-    @Simulation.state.setter
-    def state(self, state):
-        Simulation.state.fset(self, state)
-        self._note_change()
-
-    def _note_change(self):
-        before, self._stored = self._stored, self._meter.stored_energy(self._x)
-        self.stored_by_changes += self._stored - before
-
-    def reset(self):
-        self._stored = self.stored_by_changes = 0.0
-        super().reset()
+    def _made(self, model, run, books=None):
         self._layout = layout = Layout.of(self.mechanism)
-        self._tick = self._total = (0.0,) * (layout.scale + 1)
-        self.worst = self.stored_by_changes = 0.0   # the start is no change
-        may_return = len(self.gear_names + self.bearing_names)
-        self._returned_ticks, self._returned = [0] * may_return, [0.0] * may_return
-
-    def advance(self, torques, clutch_forces=NO_FORCE):
-        steps = super().advance(torques, clutch_forces)
-        meter, T, layout = self._meter, self._held, self._layout
-        if layout.half_shafts.start < layout.half_shafts.stop:   # a twist may be forgotten
-            self.stored_by_changes += meter.stored_energy(steps[0][0]) - self._stored
-        tick = meter.book(steps[0], T)
-        if len(steps) > 1:
-            for step in steps[1:]:
-                tick = tuple(map(add, tick, meter.book(step, T)))
-        self._stored = stored = meter.stored_energy(self._x)
-        scale = max(sum(map(abs, tick)), AT_REST * stored)
-        work = sum(tick[layout.work])
-        residual = abs(work + work - sum(tick))   # work less all others
-        if residual > self.worst * scale:
-            self.worst = residual / scale
-        losses = tick[layout.gears_and_bearings]
-        if min(losses) < -NO_LOSS * scale:
-            self._note_returned(losses, NO_LOSS * scale)
-        self._tick = tick = (*tick, scale)
-        self._total = tuple(map(add, self._total, tick))
-        return steps
-
-    def _note_returned(self, losses, rounding):
-        for n, loss in enumerate(losses):
-            if loss < -rounding:
-                self._returned_ticks[n] += 1
-                self._returned[n] -= loss
+        return super()._made(model, run, Books(meter_of(model), layout))
 
     def snapshot(self):
         """Return the ``AuditedSnapshot`` of the last tick, or of the start at zero torque."""
-        return AuditedSnapshot.of(self._report(), Energy(self._tick, self._layout), self._stored)
+        return self._audited(self._ticker.report())
+
+    def step(self, torques, clutch_forces=NO_FORCE):
+        """Advance one tick, as ``advance``, and return its ``AuditedSnapshot``."""
+        return self._audited(self._stepped(torques, clutch_forces))
+
+    def _audited(self, reported):
+        tick, stored = self._ticker.energy()
+        return AuditedSnapshot.of(reported, Energy(tick, self._layout), stored)
 
     @property
     def stored_energy(self):
         """The kinetic energy now, and that in the twist of half-shafts, J."""
-        return self._stored
+        return self._ticker.energy()[1]
+
+    @property
+    def stored_by_changes(self):
+        """What changes of parameters or state added to the stored energy, J."""
+        return self._ticker.booked().changes
+
+    @property
+    def worst(self):
+        """The largest ``relative_residual`` of a tick; it may be set back to 0.0."""
+        return self._ticker.worst
+
+    @worst.setter
+    def worst(self, value):
+        self._ticker.worst = value
 
     @property
     def tick(self):
         """The ``Energy`` of the last tick, J."""
-        return Energy(self._tick, self._layout)
+        return Energy(self._ticker.energy()[0], self._layout)
 
     @property
     def total(self):
         """The ``Energy`` of all ticks since the start, J."""
-        return Energy(self._total, self._layout)
+        return Energy(self._ticker.booked().total, self._layout)
 
     @property
     def power(self):
         """The mean power in the last tick, as an ``Energy`` in W."""
-        return Energy(tuple([entry / self.dt for entry in self._tick]), self._layout)
+        return Energy(tuple([entry / self.dt for entry in self._ticker.energy()[0]]), self._layout)
 
     @property
     def returned(self):
         """``{gear or bearing: Returned}`` since the start: losses that gave energy back."""
+        booked = self._ticker.booked()
         return {name: Returned(ticks, energy) for name, ticks, energy in zip(
-            self.gear_names + self.bearing_names, self._returned_ticks, self._returned)}
+            self.gear_names + self.bearing_names, booked.returned_ticks, booked.returned)}

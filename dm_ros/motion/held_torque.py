@@ -4,9 +4,12 @@
 """The step of the symmetric differential: linear under held torques, hence exact at any length."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from dm_ros.mechanism.losses import SymmetricLosses
+from dm_ros.mechanism.symmetric import Moments
 from dm_ros.motion.exponentials import held_propagator, phi_matrices, product
 
 
@@ -41,6 +44,15 @@ class HeldTorqueStep:
     Theta_22: float
 
 
+class Exact(NamedTuple):
+    """What a step that is exact does, in x = (w, s), and what its books need."""
+
+    step: HeldTorqueStep
+    moments: Moments
+    losses: SymmetricLosses
+    second: tuple   # of ``quadrature.second_moment_of_the_way``
+
+
 def held_torque_step(A, B, h):
     """Return the ``HeldTorqueStep`` over h, s, of dx/dt = A x + B T."""
     Phi, Gamma, Psi, Theta = held_propagator(A, B, h)
@@ -49,8 +61,11 @@ def held_torque_step(A, B, h):
 
 
 def held_torque_step_by_floats(A, B, h):
-    """Return the same in plain floats, which is quick enough for the middle of a run."""
-    A, B = A.ravel().tolist(), B.tolist()
+    """
+    Return the same in plain floats, which is quick enough for the middle of a run.
+
+    :param A: (11, 12, 21, 22); B: its two rows.
+    """
     first, second = phi_matrices([h * a for a in A])
     rows = []
     # x + h phi_1 (A x + B T), and its integral h x + h^2 phi_2 (A x + B T)

@@ -15,27 +15,19 @@ is its integral, its second moment, the integral of x x', and what friction does
 
 from operator import add, mul
 
-import numpy as np
-
-from dm_ros.mechanism import losses, passive, symmetric
+from dm_ros.mechanism import losses, passive
 from dm_ros.mechanism.clutched import evaluate
-from dm_ros.mechanism.kinetic import (
-    energy_gained,
-    kinetic_energy,
-    symmetric_form,
-)
-from dm_ros.mechanism.symmetric import TO_SLIP
+from dm_ros.mechanism.kinetic import energy_gained, kinetic_energy
 from dm_ros.motion.exponentials import way
+from dm_ros.motion.held_torque import Exact
 from dm_ros.motion.models import (
-    Booked,
     ClutchedModel,
     ClutchedSymmetricModel,
     PassiveModel,
     PassiveSymmetricModel,
     SymmetricModel,
 )
-from dm_ros.motion.patterns import Pattern
-from dm_ros.motion.quadrature import rule_for, second_moment_of_the_way
+from dm_ros.motion.quadrature import rule_for
 
 
 def leads_far(w, s, d_w, d_s):
@@ -43,15 +35,14 @@ def leads_far(w, s, d_w, d_s):
     return abs(d_w) + abs(d_s) > 0.05 * (abs(w) + abs(s))
 
 
-def linear_book(second, k, q, m, g_F, h, start, end, integral, T):
+def exact_book(exact, m, g_F, h, start, end, integral, T):
     """
     Return the energies of an exact step of a symmetric differential, see the module.
 
-    :param second: of ``second_moment_of_the_way``; k: ``Moments``; q: ``SymmetricLosses``;
-        m: the form of the kinetic energy; all of them, and the speeds, in (w, s).
+    :param m: the form of the kinetic energy.
     """
     (w, s), (w_end, s_end), (a_w, a_s), (T_3, T_1, T_2) = start, end, integral, T
-    k_11, k_12, k_13, k_21, k_22, k_23, k_31, k_32, k_33 = second
+    _, k, q, (k_11, k_12, k_13, k_21, k_22, k_23, k_31, k_32, k_33) = exact
     # the integral of x x'
     d_w, d_s = w_end - w, s_end - s
     d_ww, d_ws, d_ss = d_w * d_w, d_w * d_s, d_s * d_s
@@ -74,38 +65,31 @@ def linear_book(second, k, q, m, g_F, h, start, end, integral, T):
             *lost, 0.0)
 
 
-class SymmetricMeter:
-    """The books of a symmetric differential under the paper's law, exact."""
+class Meter:
+    """What all meters have in common: what the model tells them."""
 
     def __init__(self, model):
-        p, self._h = model.parameters, model.h
-        self._m = symmetric_form(p)
-        self._g_F, self._linear = p.g_F, {}
-        for direction, r in model.responses.items():
-            from_slip = np.linalg.inv(TO_SLIP)
-            moments = symmetric.Moments(*np.hstack([r.P @ from_slip, r.Q]).ravel().tolist())
-            self._linear[direction] = (
-                second_moment_of_the_way(TO_SLIP @ r.A @ from_slip, model.h), moments,
-                losses.symmetric_losses(p, direction))
+        self._model, self.form = model, model.form
 
     def stored_energy(self, x):
         """Return the kinetic energy at the speeds x, J."""
-        return kinetic_energy(self._m, in_slip(x))
+        return kinetic_energy(self.form, x)
+
+    def angles(self, integral):
+        """Return the angles of the shafts with a port from the integral of x, rad."""
+        return self._model.at_ports(integral)
+
+
+class ExactMeter(Meter):
+    """The books of a symmetric differential under the paper's law, exact."""
 
     def book(self, step, T):
         """Return the energies of a step, see the module."""
-        x, direction, end, integral, _, _, _ = step
-        return linear_book(*self._linear[direction], self._m, self._g_F, self._h, in_slip(x),
-                           in_slip(end), in_slip(integral), T)
+        x, _, end, integral, _, _, exact = step
+        return exact_book(exact, self.form, self._model.g_F, self._model.h, x, end, integral, T)
 
 
-def in_slip(x):
-    """Return (omega_0, slip) from (omega_1, omega_2)."""
-    x_1, x_2 = x
-    return (x_1 + x_2) / 2, x_1 - x_2
-
-
-class ClutchedMeter:
+class ClutchedMeter(Meter):
     """
     The books of a self-locking differential under the paper's law, along an adaptive step.
 
@@ -118,21 +102,6 @@ class ClutchedMeter:
 
     CALM = 4e-6   # rad/s of c: with less, the remainder is some hundredth of the step's tolerance
 
-    def __init__(self, model):
-        p, self.form, self._losses = model.parameters, model.form, model.losses
-        self._k_1, self._k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
-        self._input_ratio = 1.0   # of the input shaft to the carrier
-        self._coefficients = model.coefficients
-
-    def stored_energy(self, x):
-        """Return the kinetic energy at the speeds x, J."""
-        return kinetic_energy(self.form, x)
-
-    def angles(self, integral):
-        """Return the angles of the shafts with a port from the integral of x, rad."""
-        a_w, a_s = integral
-        return self._input_ratio * a_w, a_w + self._k_1 * a_s, a_w - self._k_2 * a_s
-
     def lost_powers(self, direction, T, y, u, point):
         """Return the power that each element loses at a ``point``, W."""
         (w, s), (_, _, F_1, F_2, M_1, M_2, *_) = y, point
@@ -141,22 +110,17 @@ class ClutchedMeter:
 
     def book(self, step, T):
         """Return the energies of a step, see the module."""
-        x, direction, end, integral, _, _, path = step
-        lost, numerical = path if type(path) is Booked else self._booked(direction, T, *path)
-        work = map(mul, T, self.angles(integral))
-        return *work, energy_gained(self.form, x, end), *lost, numerical
-
-    def _booked(self, direction, T, u, parts):
-        first, *others = parts
+        x, direction, end, integral, _, _, (u, (first, *others)) = step
         lost, numerical = self._part(direction, u, T, first)
         for part in others:
             more, taken = self._part(direction, u, T, part)
             lost, numerical = tuple(map(add, lost, more)), numerical + taken
-        return Booked(lost, numerical)
+        work = map(mul, T, self.angles(integral))
+        return *work, energy_gained(self.form, x, end), *lost, numerical
 
     def _part(self, direction, u, T, part):
         """Return what the elements lost in a part of the path, and what its error took."""
-        k = self._coefficients[direction]
+        k = self._model.coefficients[direction]
         (w, s), f, J, F, h, (d_w, d_s), (c_w, c_s), (a_w, a_s), straight, here, there = part
         (J_ww, J_ws, J_sw, J_ss), (F_1w, F_1s, F_2w, F_2s) = J, F
         v_w, v_s, F_1, F_2, _, _, _, _, _, _ = here
@@ -241,27 +205,22 @@ class ClutchedMeter:
 
     def _lost(self, direction, T, a_w, *products):
         """Return what the elements lose, from products as ``losses`` has them."""
-        return losses.self_locking(self._losses[direction], *products, T[0] * a_w)
+        return losses.self_locking(self._model.losses[direction], *products, T[0] * a_w)
 
 
 class ClutchedSymmetricMeter(ClutchedMeter):
     """The books of a symmetric differential with clutches under the paper's law."""
 
-    def __init__(self, model):
-        super().__init__(model)
-        self._input_ratio = model.parameters.g_F
-        self._final_drives = model.final_drives
-
     def _lost(self, direction, T, a_w, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, *meshes):
-        k, (T_3, T_1, T_2) = self._final_drives[direction], T
+        k, (T_3, T_1, T_2) = self._model.final_drives[direction], T
         M_F_w = ((k.Q_0 * T_3 + k.Q_1 * T_1 + k.Q_2 * T_2) * a_w + k.P_w * X_ww + k.P_s * X_ws
                  - k.W_1 * F_1_w - k.W_2 * F_2_w)
         return losses.symmetric_with_clutches(
-            self._losses[direction], X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, M_F_w,
-            *meshes, T_3 * self._input_ratio * a_w)
+            self._model.losses[direction], X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, M_F_w,
+            *meshes, T_3 * self._model.g_F * a_w)
 
 
-class PassiveMeter:
+class PassiveMeter(Meter):
     """
     The books of a differential under the passive law: no loss in them is ever negative.
 
@@ -270,52 +229,33 @@ class PassiveMeter:
     last resort has all losses at its end; what it takes beside them is the energy of its jump.
     """
 
-    def __init__(self, model):
-        self._h, self._k, self._clutches = model.h, model.k, model.clutches
-        self.form = model.form
-
-    def stored_energy(self, x):
-        """Return the kinetic energy at the speeds x, J."""
-        return kinetic_energy(self.form, x)
-
     def book(self, step, T):
         """Return the energies of a step, see the module."""
         x, _, end, integral, _, _, path = step
-        k = self._k
-        if type(path) is Pattern:
-            return linear_book(path.second, path.moments, path.losses, self.form, k.g_F, self._h,
-                               x, end, integral, T)
-        lost, numerical = path if type(path) is Booked else self._booked(*path)
-        work = map(mul, T, self.angles(integral))
-        return *work, energy_gained(self.form, x, end), *self._of_elements(lost), numerical
-
-    def _booked(self, u, parts):
-        first, *others = parts
+        if type(path) is Exact:
+            return exact_book(path, self.form, self._model.g_F, self._model.h, x, end, integral, T)
+        u, (first, *others) = path
         lost, numerical = self._part(u, first)
         for part in others:
             more, taken = self._part(u, part)
             lost, numerical = tuple(map(add, lost, more)), numerical + taken
-        return Booked(lost, numerical)
-
-    def angles(self, integral):
-        """Return the angles of the shafts with a port from the integral of x, rad."""
-        k, (a_w, a_s) = self._k, integral
-        return (k.g_F or 1.0) * a_w, a_w + k.k_1 * a_s, a_w - k.k_2 * a_s
+        work = map(mul, T, self.angles(integral))
+        return *work, energy_gained(self.form, x, end), *self._of_elements(lost), numerical
 
     def lost_powers(self, flow, T, y, u, point):
         """Return the power that each element loses at a ``point``, W."""
-        return self._of_elements(passive.lost_powers(self._k, u, point))
+        return self._of_elements(passive.lost_powers(self._model.k, u, point))
 
     def _of_elements(self, lost):
         """Return what the elements lose that there are, of those that ``passive`` knows."""
         drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0, *clutches = lost
-        own = ((drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0) if self._k.g_F
+        own = ((drag, final_drive, mesh_1, mesh_2, bearing_3, bearing_0) if self._model.g_F
                else (drag, mesh_1, mesh_2, bearing_0))
-        return (*own, *clutches) if self._clutches else own
+        return (*own, *clutches) if self._model.clutches else own
 
     def _part(self, u, part):
         """Return what the elements lost in a part of the path, and what its error took."""
-        k, (m_ww, m_ws, m_ss) = self._k, self.form
+        k, (m_ww, m_ws, m_ss) = self._model.k, self.form
         (w_0, s_0), f, J, _, h, (d_w, d_s), (c_w, c_s), _, straight, here, there = part
         if straight:
             jump = kinetic_energy(self.form, (d_w, d_s))
@@ -339,7 +279,7 @@ class PassiveMeter:
         return tuple([h * loss for loss in lost]), -h * taken
 
 
-METERS = {SymmetricModel: SymmetricMeter, ClutchedModel: ClutchedMeter,
+METERS = {SymmetricModel: ExactMeter, ClutchedModel: ClutchedMeter,
           ClutchedSymmetricModel: ClutchedSymmetricMeter, PassiveModel: PassiveMeter,
           PassiveSymmetricModel: PassiveMeter}
 

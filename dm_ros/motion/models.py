@@ -13,23 +13,20 @@ what it did, a tuple::
     (x, flow, end, integral, point, coarse, path)
 
 from the speeds at the start to those at the end, with their integral over the step. ``point`` is
-what is known at the end and saves finding it again for the moments, or None; ``path`` tells the
-way between: the ``Pattern`` of an exact step, ``(u, parts)`` of ``adaptive.step``, what was
-``Booked`` along it in C, or None where the flow tells it.
+what is known at the end and saves finding it again for the moments; ``path`` tells the way
+between: what is ``Exact`` of an exact step, or ``(u, parts)`` of ``adaptive.step``.
 """
-
-import struct
-from typing import NamedTuple
 
 import numpy as np
 
-from dm_ros import core
 from dm_ros.mechanism import clutched, losses, passive, symmetric
 from dm_ros.mechanism.kinetic import self_locking_form, symmetric_form
 from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.motion import adaptive, held_torque
-from dm_ros.motion.patterns import exact_step, Pattern, Patterns
+from dm_ros.motion.held_torque import Exact, held_torque_step
+from dm_ros.motion.patterns import exact_step, Patterns
+from dm_ros.motion.quadrature import second_moment_of_the_way
 
 PASSIVE, PAPER = LOSS_LAWS = 'passive', 'paper'
 
@@ -53,129 +50,108 @@ def no_solution(parameters):
                       'solution, some are too large or too small beside the others')
 
 
-class Booked(NamedTuple):
-    """What the elements lost along the path of a step, and what its error took, J."""
-
-    lost: tuple        # in the order of ``passive.lost_powers``, or of ``losses``
-    numerical: float
-
-
-class SymmetricModel:
-    """A symmetric differential under the paper's law; x is (omega_1, omega_2)."""
+class Model:
+    """What all have in common; x is (w, s), the carrier speed and the slip omega_1 - omega_2."""
 
     lagged = False
     half_shafts = ()
-    language = 'Python'   # of its steps
 
-    def __init__(self, formulation, parameters, h):
-        self.parameters, self.h = parameters, h
-        self.responses = responses_of(formulation, parameters)
-        self._g_F, self._g_2s = parameters.g_F, parameters.g_2s
-        self._step, self.moments = {}, {}
-        for direction, response in self.responses.items():
-            self._step[direction] = held_torque.held_torque_step(response.A, response.B, h)
-            # M in one sign for both directions
-            rows = direction * np.hstack([response.P, response.Q])
-            self.moments[direction] = symmetric.Moments(*rows.ravel().tolist())
+    def __init__(self, parameters, h, clutches=True):
+        p = self.parameters = parameters
+        self.h = h
+        self.g_12, self.g_2s, self.g_F = p.g_12, p.g_2s, getattr(p, 'g_F', 0.0)
+        self.k_1, self.k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
+        self.form = (symmetric_form if self.g_F else self_locking_form)(p)
+        self.phi, self.preload = (clutched.full_friction(p) if clutches
+                                  else ((0.0, 0.0), (0.0, 0.0)))
 
     def independent(self, omega_1, omega_2):
         """Return x for the given speeds of the output shafts."""
-        return omega_1, omega_2
+        return (omega_1 + self.g_12 * omega_2) / (1 + self.g_12), omega_1 - omega_2
 
     def all_shafts(self, x):
-        """Return the speeds of all shafts from x, or their angles from its integral, (5)-(7)."""
-        x_1, x_2 = x
-        x_0 = (x_1 + x_2) / 2
-        return x_0, x_1, x_2, self._g_F * x_0, (x_2 - x_1) / (2 * self._g_2s)
+        """Return the speeds of all shafts from x, or their angles from its integral, (5), (53)."""
+        w, s = x
+        spin = (0.0 - s) * self.k_2 / self.g_2s
+        if self.g_F:
+            return w, w + self.k_1 * s, w - self.k_2 * s, self.g_F * w, spin
+        return w, w + self.k_1 * s, w - self.k_2 * s, spin
+
+    def at_ports(self, x):
+        """Return the speeds of the shafts with a port from x, or their angles."""
+        w, s = x
+        return (self.g_F or 1.0) * w, w + self.k_1 * s, w - self.k_2 * s
 
     def flow(self, x, T, deadband, last):
-        """Return the power-flow index, (35)-(36)."""
-        x_1, x_2 = x
-        T_3, T_1, T_2 = T
-        return power_flow(T_3 * self._g_F * (x_1 + x_2) / 2, T_1 * x_1 + T_2 * x_2, deadband,
-                          last)
+        """Return the power-flow index of the paper, (35)-(36)."""
+        (_, x_1, x_2), (T_0, T_1, T_2) = self.at_ports(x), T
+        return power_flow(T_0 * (self.g_F or 1.0) * x[0], T_1 * x_1 + T_2 * x_2, deadband, last)
+
+    def friction(self, memory, forces):
+        """Return S, see the module, N m, under axial forces on the clutches, N."""
+        return clutched.held_friction(
+            self.parameters, self.phi if self.lagged else None, self.preload, memory, forces)
+
+
+class SymmetricModel(Model):
+    """A symmetric differential under the paper's law, whose steps are exact."""
+
+    def __init__(self, formulation, parameters, h):
+        super().__init__(parameters, h, clutches=False)
+        self.exact = {}
+        for direction, response in responses_of(formulation, parameters).items():
+            A, B, _, P, Q, _ = symmetric.in_slip(response)
+            rows = direction * np.hstack([P, Q])   # M as it is reported
+            self.exact[direction] = Exact(
+                held_torque_step(A, B, h), symmetric.Moments(*rows.ravel().tolist()),
+                losses.symmetric_losses(parameters, direction).of_reported(direction),
+                second_moment_of_the_way(A.ravel().tolist(), h))
 
     def step(self, x, S, T, direction):
         """Advance by h; see the module for what is returned."""
-        end, integral = held_torque.step(self._step[direction], x, T)
-        return x, direction, end, integral, None, False, None
-
-    def friction(self, memory, forces):
-        """Return None: there is no clutch."""
+        exact = self.exact[direction]
+        end, integral = held_torque.step(exact.step, x, T)
+        return x, direction, end, integral, exact, False, exact
 
     def point(self, x, S, T, direction):
-        """Return None: the moments need no point."""
+        """Return what is exact in a direction."""
+        return self.exact[direction]
 
-    def internal_moments(self, x, T, direction, point):
+    def internal_moments(self, x, T, direction, exact):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
-        return symmetric.moments(self.moments[direction], x, T)
+        return symmetric.moments(exact.moments, x, T)
 
 
-class ClutchedModel:
-    """A self-locking differential under the paper's law; x is (omega_0, omega_1 - omega_2)."""
-
-    half_shafts = ()
-    language = 'Python'   # of its steps
+class ClutchedModel(Model):
+    """A self-locking differential under the paper's law."""
 
     def __init__(self, formulation, parameters, h):
-        self.parameters, self.h = parameters, h
+        super().__init__(parameters, h)
         self.responses = self._responses(formulation)
         self.lagged = getattr(formulation, 'lagged', False)
-        self._g_12, self._g_2s = parameters.g_12, parameters.g_2s
-        self._phi, self._preload = clutched.full_friction(parameters)
         # |M| of the last step feeds the friction of the next, which amplifies errors
         self.tolerance = adaptive.TOLERANCE / 5 if self.lagged else adaptive.TOLERANCE
         self.coefficients = {
             direction: clutched.coefficients(
                 parameters, response, not self.lagged, direction)
             for direction, response in self.responses.items()}
-        self.losses, self.form = self._books()
-        self._core_step = core.paper_step
-        self.language = core.language if self._core_step else 'Python'
-        self._packed = {
-            direction: (core.packed(self.coefficients[direction]), self._packed_losses(direction))
-            for direction in self.responses}
+        self.losses = self._losses()
 
     def _responses(self, formulation):
         return responses_of(formulation, self.parameters)
 
-    def _books(self):
-        """Return the coefficients of the losses by direction, and the form of the energy."""
-        p = self.parameters
-        return ({direction: losses.self_locking_losses(p, direction)
-                 for direction in self.responses}, self_locking_form(p))
-
-    def _packed_losses(self, direction):
-        return core.packed(self.losses[direction])
+    def _losses(self):
+        return {direction: losses.self_locking_losses(self.parameters, direction)
+                for direction in self.responses}
 
     def coefficients_of(self, direction):
         """Return the ``Coefficients`` of a direction of power flow, see ``clutched``."""
         return self.coefficients[direction]
 
-    def independent(self, omega_1, omega_2):
-        """Return x for the given speeds of the output shafts."""
-        return (omega_1 + self._g_12 * omega_2) / (1 + self._g_12), omega_1 - omega_2
-
-    def all_shafts(self, x):
-        """Return the speeds of all shafts from x, or their angles from its integral, (53)."""
-        x_0, slip = x
-        g = 1 + self._g_12
-        return x_0, x_0 + self._g_12 / g * slip, x_0 - slip / g, (0.0 - slip) / (self._g_2s * g)
-
-    def flow(self, x, T, deadband, last):
-        """Return the power-flow index, (35)-(36)."""
-        x_0, x_1, x_2, _ = self.all_shafts(x)
-        T_0, T_1, T_2 = T
-        return power_flow(T_0 * x_0, T_1 * x_1 + T_2 * x_2, deadband, last)
-
     def step(self, x, S, T, direction):
         """Advance by h; see the module for what is returned."""
         k = self.coefficients[direction]
         u = clutched.held(k, T, S)
-        if self._core_step:
-            end, integral, point, coarse, books = self._core_step(
-                *self._packed[direction], u, T, x, self.h, self.tolerance, self.form)
-            return x, direction, end, integral, point, coarse, Booked(*books)
         end, integral, point, coarse, parts = adaptive.step(
             adaptive.PAPER, k, u, x, self.h, self.tolerance)
         return x, direction, end, integral, point, coarse, (u, parts)
@@ -195,18 +171,9 @@ class ClutchedModel:
         _, _, _, _, M_1, M_2, _, _, _, _ = point
         return clutched.pressing(self.parameters, direction * M_1, direction * M_2)
 
-    def friction(self, memory, forces):
-        """Return S, see the module, N m, under axial forces on the clutches, N."""
-        return clutched.held_friction(
-            self.parameters, self._phi if self.lagged else None, self._preload, memory, forces)
-
 
 class ClutchedSymmetricModel(ClutchedModel):
-    """A symmetric differential with clutches under the paper's law; x is as of the other."""
-
-    def __init__(self, formulation, parameters, h):
-        self._g_F = parameters.g_F
-        super().__init__(formulation, parameters, h)
+    """A symmetric differential with clutches under the paper's law."""
 
     def _responses(self, formulation):
         responses = {direction: symmetric.in_slip(response) for direction, response
@@ -215,26 +182,9 @@ class ClutchedSymmetricModel(ClutchedModel):
                              for direction, response in responses.items()}
         return responses
 
-    def _books(self):
-        p = self.parameters
-        return ({direction: losses.symmetric_losses(p, direction)
-                 for direction in self.responses}, symmetric_form(p))
-
-    def _packed_losses(self, direction):
-        return core.packed(self.losses[direction], self.final_drives[direction]) + (
-            struct.pack('d', self._g_F))
-
-    def all_shafts(self, x):
-        """Return the speeds of all shafts from x, or their angles from its integral, (5)-(7)."""
-        x_0, slip = x
-        return (x_0, x_0 + slip / 2, x_0 - slip / 2, self._g_F * x_0,
-                (0.0 - slip) / (2 * self._g_2s))
-
-    def flow(self, x, T, deadband, last):
-        """Return the power-flow index, (35)-(36)."""
-        x_0, x_1, x_2, x_3, _ = self.all_shafts(x)
-        T_3, T_1, T_2 = T
-        return power_flow(T_3 * x_3, T_1 * x_1 + T_2 * x_2, deadband, last)
+    def _losses(self):
+        return {direction: losses.symmetric_losses(self.parameters, direction)
+                for direction in self.responses}
 
     def internal_moments(self, x, T, direction, point):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
@@ -242,42 +192,22 @@ class ClutchedSymmetricModel(ClutchedModel):
         return direction * M_F, *super().internal_moments(x, T, direction, point)
 
 
-class PassiveModel:
-    """A differential under the passive law; x is (omega_0, omega_1 - omega_2)."""
-
-    half_shafts = ()
+class PassiveModel(Model):
+    """A differential under the passive law."""
 
     def __init__(self, formulation, parameters, h, clutches):
-        self.parameters, self.h, self.clutches = parameters, h, clutches
+        super().__init__(parameters, h, clutches)
+        self.clutches = clutches
         self.lagged = getattr(formulation, 'lagged', False)
         responses_of(formulation, parameters)   # refuses what overflows
         self.k = passive.coefficients(parameters, clutches, not self.lagged)
         if not passive.has_solutions(self.k):
             raise no_solution(parameters)
-        self._phi, self._preload = (clutched.full_friction(parameters) if clutches
-                                    else ((0.0, 0.0), (0.0, 0.0)))
-        self._g_2s = parameters.g_2s
-        self.form = (symmetric_form if self.k.g_F else self_locking_form)(parameters)
         self.tolerance = adaptive.TOLERANCE / 5   # signs that turn round make kinks
-        self._core_step, self._packed = core.passive_step, core.packed(self.k)
-        self.language = core.language if self._core_step else 'Python'
 
     def coefficients_of(self, flow):
         """Return the ``Coefficients``, see ``passive``; nothing depends on the flow."""
         return self.k
-
-    def independent(self, omega_1, omega_2):
-        """Return x for the given speeds of the output shafts."""
-        return (omega_1 + self.k.g_12 * omega_2) / (1 + self.k.g_12), omega_1 - omega_2
-
-    def all_shafts(self, x):
-        """Return the speeds of all shafts from x, or their angles from its integral."""
-        x_0, slip = x
-        k = self.k
-        spin = (0.0 - slip) * k.k_2 / self._g_2s
-        if k.g_F:
-            return x_0, x_0 + k.k_1 * slip, x_0 - k.k_2 * slip, k.g_F * x_0, spin
-        return x_0, x_0 + k.k_1 * slip, x_0 - k.k_2 * slip, spin
 
     def flow(self, x, T, deadband, last):
         """Return who drives, +1 for the input shaft; nothing depends on it."""
@@ -286,8 +216,7 @@ class PassiveModel:
 
     def step(self, x, S, T, flow):
         """Advance by h; see the module for what is returned."""
-        u = passive.held(self.k, T, S)
-        return self._adaptive_step(x, u, flow)
+        return self._adaptive_step(x, passive.held(self.k, T, S), flow)
 
     def point(self, x, S, T, flow):
         """Return the point at a state, see ``passive``."""
@@ -297,7 +226,7 @@ class PassiveModel:
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
         _, _, F_1, F_2, M_1, M_2, M_F, *_ = point
         outputs = M_1, M_2, F_1 + 0.0, F_2 + 0.0   # no -0.0 at rest
-        return (M_F + 0.0, *outputs) if self.k.g_F else outputs
+        return (M_F + 0.0, *outputs) if self.g_F else outputs
 
     def remembered(self, point, flow):
         """Return the ``|M|`` that the friction of the next step of ``lsd_lagged`` knows."""
@@ -305,18 +234,9 @@ class PassiveModel:
         return clutched.pressing(self.parameters, M_1, M_2)
 
     def _adaptive_step(self, x, u, flow, here=None):
-        if self._core_step:
-            end, integral, point, coarse, books = self._core_step(
-                self._packed, u, x, self.h, self.tolerance, self.form)
-            return x, flow, end, integral, point, coarse, Booked(*books)
         end, integral, point, coarse, parts = adaptive.step(
             adaptive.PASSIVE, self.k, u, x, self.h, self.tolerance, here)
         return x, flow, end, integral, point, coarse, (u, parts)
-
-    def friction(self, memory, forces):
-        """Return S, see the module, N m, under axial forces on the clutches, N."""
-        return clutched.held_friction(
-            self.parameters, self._phi if self.lagged else None, self._preload, memory, forces)
 
 
 class PassiveSymmetricModel(PassiveModel):
@@ -324,7 +244,7 @@ class PassiveSymmetricModel(PassiveModel):
 
     def __init__(self, formulation, parameters, h, clutches):
         super().__init__(formulation, parameters, h, clutches)
-        self._patterns = Patterns(formulation(parameters), parameters, self.k, h)
+        self._patterns = Patterns(self.k, h)
         self._guess = None   # the pattern met last: where it fits, it is the one
 
     def step(self, x, S, T, flow):
@@ -341,21 +261,22 @@ class PassiveSymmetricModel(PassiveModel):
                 self._guess = guess = pattern or guess
             if done:
                 end, integral = done
-                return x, flow, end, integral, guess, False, guess
+                return x, flow, end, integral, guess.exact, False, guess.exact
         x, flow, end, integral, point, coarse, path = self._adaptive_step(x, u, flow, here)
-        return x, flow, end, integral, self._with_pattern(end, u, point), coarse, path
+        return x, flow, end, integral, self._exact_or(point, end, u), coarse, path
 
     def point(self, x, S, T, flow):
-        """Return the pattern at a state, or its point where there is none."""
+        """Return what is exact at a state, or its point where nothing is."""
         u = passive.held(self.k, T, S)
-        return self._with_pattern(x, u, passive.evaluate(self.k, u, *x))
+        return self._exact_or(passive.evaluate(self.k, u, *x), x, u)
 
-    def _with_pattern(self, x, u, point):
-        return self._patterns.has_one_at(x) and self._patterns.of(u, point) or point
+    def _exact_or(self, point, x, u):
+        pattern = self._patterns.has_one_at(x) and self._patterns.of(u, point)
+        return pattern.exact if pattern else point
 
     def internal_moments(self, x, T, flow, point):
         """Return the moments, N m; a mesh is positive when the mechanism drives the shaft."""
-        if type(point) is Pattern:
+        if type(point) is Exact:
             return symmetric.moments(point.moments, x, T)
         return point[6] + 0.0, point[4] + 0.0, point[5] + 0.0
 

@@ -15,12 +15,11 @@ one sign at both ends too, or if it is so small that f cannot have come down to 
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from dm_ros.mechanism import passive, symmetric
-from dm_ros.mechanism.losses import symmetric_drag, SymmetricLosses
-from dm_ros.mechanism.symmetric import TO_SLIP
+from dm_ros.mechanism import passive
+from dm_ros.mechanism.losses import SymmetricLosses
+from dm_ros.mechanism.symmetric import Moments
 from dm_ros.motion import held_torque
+from dm_ros.motion.held_torque import Exact, held_torque_step_by_floats
 from dm_ros.motion.quadrature import second_moment_of_the_way
 
 MARGIN = 1e-9   # N m from turning round, within which no pattern is taken
@@ -29,21 +28,18 @@ MARGIN = 1e-9   # N m from turning round, within which no pattern is taken
 class Pattern(NamedTuple):
     """What is linear while the signs are these; x is (w, s), T is (T_3, T_1, T_2)."""
 
-    step: held_torque.HeldTorqueStep
-    slope: tuple                        # rows (w, s, T_3, T_1, T_2) of dw/dt and ds/dt
-    moments: symmetric.Moments          # in one sign for all flows
-    kept: tuple                         # rows (w, s, T_3, T_1, T_2, least) of what must stay above
-    input_sign: float                   # of T_3
-    reach: tuple                        # s, times the slopes at both ends: how far f can come down
-    losses: SymmetricLosses
-    second: tuple                       # of ``second_moment_of_the_way``
+    exact: Exact
+    slope: tuple        # rows (w, s, T_3, T_1, T_2) of dw/dt and ds/dt
+    kept: tuple         # rows (w, s, T_3, T_1, T_2, least) of what must stay above 0
+    input_sign: float   # of T_3
+    reach: tuple        # s, times the slopes at both ends: how far f can come down
 
 
 class Patterns:
-    """The patterns of one formulation with one set of parameters and one step length."""
+    """The patterns of one set of parameters and one step length, under the passive law."""
 
-    def __init__(self, equations, p, k, h):
-        self._equations, self._p, self._k, self._h = equations, p, k, h
+    def __init__(self, k, h):
+        self._k, self._h = k, h
         self._kept = {}
         self._fast = passive.SATURATED * k.sign_speed
 
@@ -57,53 +53,69 @@ class Patterns:
     def of(self, u, point):
         """Return the ``Pattern`` at a point where all is fast, None where there is none."""
         _, _, _, _, _, _, _, signs, (_, _, *sigmas, _, _), _ = point
-        key = (*sigmas, *signs, u[0] >= 0.0)
+        input_sign = 1.0 if u[0] >= 0.0 else -1.0
+        key = (*sigmas, *signs, input_sign)
         if key not in self._kept:
-            self._kept[key] = self._pattern(point, 1.0 if u[0] >= 0.0 else -1.0)
+            try:
+                self._kept[key] = pattern(self._k, self._h, point, input_sign)
+            except (ArithmeticError, ValueError):
+                self._kept[key] = None
         return self._kept[key]
 
-    def _pattern(self, point, input_sign):
-        k, p = self._k, self._p
-        _, _, _, _, _, _, _, (s_1, s_2, s_F, h_N, b), state, _ = point
-        _, _, sigma_0, sigma_1, sigma_2, _, _ = state
-        eta = passive.efficiencies(k, input_sign, point)
-        with np.errstate(all='ignore'):
-            try:
-                A, B, _, P, Q, _ = self._equations.response(eta)
-                A = TO_SLIP @ A @ np.linalg.inv(TO_SLIP)
-                step = held_torque.held_torque_step_by_floats(A, TO_SLIP @ B, self._h)
-            except (ArithmeticError, np.linalg.LinAlgError, ValueError):
-                return None
-        rows = np.hstack([A, TO_SLIP @ B])
-        # the moments N within, then M and what follows from them
-        within = np.hstack([P @ np.linalg.inv(TO_SLIP), Q])
-        n = np.array([k.mean_F + k.half_F * sigma_0 * s_F, k.mean_1 + k.half_1 * sigma_1 * s_1,
-                      k.mean_2 + k.half_2 * sigma_2 * s_2])
-        M_F, M_1, M_2 = moments = within / n[:, None]
-        N, c_F = within[1] + within[2], k.mean_F - k.half_F * sigma_0 * s_F
-        brakes, drives = float(sigma_0 * s_F < 0.0), float(sigma_0 * s_F > 0.0)
-        input_brakes = float(sigma_0 * p.g_F * input_sign < 0.0)
-        drag = np.array([k.l_0, -k.l_1 * k.k_1 + k.l_2 * k.k_2, 0.0, 0.0, 0.0])
-        bracket = sigma_0 * (drag + h_N * N - brakes * c_F * M_F)
-        speeds = np.array([[1.0, 0.0], [1.0, k.k_1], [1.0, -k.k_2]])
-        kept = [(*(sigma * row), 0.0, 0.0, 0.0, self._fast)
-                for sigma, row in zip((sigma_0, sigma_1, sigma_2), speeds)]
-        kept += [(*row, MARGIN) for row in (
-            s_F * M_F, s_1 * M_1, s_2 * M_2, (2 * h_N - 1) * sigma_0 * N, (2 * b - 1) * bracket)]
-        reach = reach_of_slopes(A, self._h)
-        if not (np.isfinite(kept).all() and np.isfinite(rows).all() and reach):
-            return None
-        bearing_3, bearing_0 = k.bearing_3, k.bearing_0 * b
-        n_F, n_1, n_2 = n.tolist()
-        losses = SymmetricLosses(
-            *symmetric_drag(p), 2 * k.half_F * s_F * sigma_0, 2 * k.half_1 * s_1 * sigma_1,
-            2 * k.half_2 * s_2 * sigma_2,
-            bearing_3 * drives * n_F, -bearing_3 * input_brakes, bearing_3,
-            bearing_0 * h_N * n_1, bearing_0 * h_N * n_2, -bearing_0 * brakes * c_F, bearing_0)
-        return Pattern(step, tuple(map(tuple, rows.tolist())),
-                       symmetric.Moments(*moments.ravel().tolist()),
-                       tuple(tuple(map(float, row)) for row in kept), input_sign,
-                       reach, losses, second_moment_of_the_way(A, self._h))
+
+def pattern(k, h, point, input_sign):
+    """
+    Return the ``Pattern`` of the signs at a point, None where its step is not exact.
+
+    :raises ArithmeticError, ValueError: where its numbers leave the range of floating point.
+    """
+    _, _, _, _, _, _, _, (s_1, s_2, s_F, h_N, b), state, solved = point
+    _, _, sigma_0, sigma_1, sigma_2, _, _ = state
+    n_1, n_2, p_1, p_2, m_1, m_2, *_ = solved
+    u = input_sign, 0.0, 0.0, 0.0, 0.0
+    (J_ww, J_ws, J_sw, J_ss), _ = passive.jacobian(k, u, point)
+    A = J_ww + 0.0, J_ws + 0.0, J_sw + 0.0, J_ss + 0.0   # no -0.0
+    B_w, B_s = passive.torque_slopes(k, u, point)
+    e_w, e_s = (A[0], A[1], *B_w), (A[2], A[3], *B_s)
+    # the moments, as in ``passive.solve``
+    n_F, c_F = k.mean_F + k.half_F * sigma_0 * s_F, k.mean_F - k.half_F * sigma_0 * s_F
+    drives, brakes = float(sigma_0 * s_F > 0.0), float(sigma_0 * s_F < 0.0)
+    input_brakes = float(sigma_0 * k.g_F * input_sign < 0.0)
+    per_torque = k.g_F / ((1 + k.bearing_3 * drives) * n_F)
+    q_1, q_2 = k.l_1 * k.k_1 / p_1, -k.l_2 * k.k_2 / p_2
+    M_1 = row(m_1, e_w, m_1 * k.k_1, e_s, (0.0, q_1, 0.0, -1 / p_1, 0.0))
+    M_2 = row(m_2, e_w, -m_2 * k.k_2, e_s, (0.0, q_2, 0.0, 0.0, -1 / p_2))
+    M_F = row(-per_torque * k.I_3 * k.g_F, e_w, 0.0, e_s,
+              (-per_torque * (1 + k.bearing_3) * k.l_3 * k.g_F, 0.0,
+               per_torque * (1 + k.bearing_3 * input_brakes), 0.0, 0.0))
+    N = row(n_1, M_1, n_2, M_2, (0.0,) * 5)
+    drag = k.l_0, -k.l_1 * k.k_1 + k.l_2 * k.k_2, 0.0, 0.0, 0.0
+    bracket = row(h_N, N, -brakes * c_F, M_F, drag)
+    kept = [(sigma_0, 0.0), (sigma_1, sigma_1 * k.k_1), (sigma_2, -sigma_2 * k.k_2)]
+    fast = passive.SATURATED * k.sign_speed
+    kept = [(*speed, 0.0, 0.0, 0.0, fast) for speed in kept]
+    for sign, moment in ((s_F, M_F), (s_1, M_1), (s_2, M_2), ((2 * h_N - 1) * sigma_0, N),
+                         ((2 * b - 1) * sigma_0, bracket)):
+        kept.append((*[sign * entry for entry in moment], MARGIN))
+    reach = reach_of_slopes(A, h)
+    numbers = [entry for entries in (*kept, e_w, e_s) for entry in entries]
+    if not (all(map(math.isfinite, numbers)) and reach):
+        return None
+    bearing_3, bearing_0, g_3 = k.bearing_3, k.bearing_0 * b, k.l_3 * k.g_F * k.g_F
+    losses = SymmetricLosses(
+        k.l_0 + g_3, k.l_1 * k.k_1 * k.k_1 + k.l_2 * k.k_2 * k.k_2 + k.l_s * k.k_2, g_3, k.l_0,
+        k.l_1 * k.k_1 - k.l_2 * k.k_2,
+        2 * k.half_F * s_F * sigma_0, 2 * k.half_1 * s_1 * sigma_1, 2 * k.half_2 * s_2 * sigma_2,
+        bearing_3 * drives * n_F, -bearing_3 * input_brakes, bearing_3,
+        bearing_0 * h_N * n_1, bearing_0 * h_N * n_2, -bearing_0 * brakes * c_F, bearing_0)
+    exact = Exact(held_torque_step_by_floats(A, (B_w, B_s), h), Moments(*M_F, *M_1, *M_2), losses,
+                  second_moment_of_the_way(A, h))
+    return Pattern(exact, (e_w, e_s), tuple(kept), input_sign, reach)
+
+
+def row(a, x, b, y, z):
+    """Return a x + b y + z of rows."""
+    return tuple([a * p + b * q + r for p, q, r in zip(x, y, z)])
 
 
 def reach_of_slopes(A, h):
@@ -113,13 +125,16 @@ def reach_of_slopes(A, h):
     A slope is g(0) p(t) + g(h) q(t), where p and q are those sums of both modes that are 1 at
     one end and 0 at the other. No time is farther than h/2 from an end.
 
+    :param A: (11, 12, 21, 22).
     :return: h/2 times the largest p and q; None where the modes of A swing.
     """
-    mean, half = (A[0, 0] + A[1, 1]) / 2, (A[0, 0] - A[1, 1]) / 2
-    square = half**2 + A[0, 1] * A[1, 0]
+    A_11, A_12, A_21, A_22 = A
+    mean, half = (A_11 + A_22) / 2, (A_11 - A_22) / 2
+    square = half * half + A_12 * A_21
     if not square > 0.0:
         return None
-    high, low = mean + math.sqrt(square), mean - math.sqrt(square)
+    root = math.sqrt(square)
+    high, low = mean + root, mean - root
     return h / 2 * largest_share(-high, -low, h), h / 2 * largest_share(high, low, h)
 
 
@@ -142,7 +157,7 @@ def exact_step(pattern, x, T):
     T_3, T_1, T_2 = T
     if T_3 * pattern.input_sign < 0.0:
         return None
-    (w_end, s_end), integral = held_torque.step(pattern.step, x, T)
+    (w_end, s_end), integral = held_torque.step(pattern.exact.step, x, T)
     (A_ww, A_ws, B_w3, B_w1, B_w2), (A_sw, A_ss, B_s3, B_s1, B_s2) = pattern.slope
     b_w = B_w3 * T_3 + B_w1 * T_1 + B_w2 * T_2
     b_s = B_s3 * T_3 + B_s1 * T_1 + B_s2 * T_2

@@ -54,8 +54,9 @@ def second_moment_of_the_way(A, h):
     Return what gives the integral of q q' from d d', both as (11, 12, 22), nine numbers by rows.
 
     q is the way from the start of a step of x' = A x + b over h, and d the whole of it.
+
+    :param A: (11, 12, 21, 22).
     """
-    A = A.ravel().tolist()
     inner, _, end = rule_for(A, h)
     (a, b, c, d), _ = phi_matrices([h * x for x in A])
     det = h * (a * d - b * c)   # the slope at the start is this matrix, inverted, times d

@@ -8,15 +8,14 @@ Nothing here depends on measured time: equal inputs give equal bits.
 """
 
 import math
-from operator import add
 
-from dm_ros.mechanism.power_flow import DIRECT
 from dm_ros.mechanism.variants import equipped, variant_named
 from dm_ros.motion.actuators import actuators_of
 from dm_ros.motion.checks import checked, checked_ports, numbers_for, refuse
 from dm_ros.motion.coupled_model import model_with
 from dm_ros.motion.models import LOSS_LAWS, PASSIVE
-from dm_ros.motion.state import Snapshot, State
+from dm_ros.motion.state import Snapshot
+from dm_ros.motion.ticker import Run, ticker_of
 
 NO_FORCE = (0.0, 0.0)   # on both clutches, where there are any
 
@@ -44,7 +43,7 @@ class Simulation:
     def __init__(self, variant, dt=0.001, parameters=None, *, loss_law=PASSIVE, substeps=1,
                  power_flow_deadband=0.0, initial_velocity=(0.0, 0.0), ports=()):
         self._variant = variant_named(variant)
-        self._model = None
+        self._ticker = None
         if loss_law not in LOSS_LAWS:
             raise ValueError(f'loss_law: {loss_law!r} is not one of {", ".join(LOSS_LAWS)}')
         self.loss_law = loss_law
@@ -53,10 +52,9 @@ class Simulation:
         ports = checked_ports(ports, self.inputs)
         self.mechanism = equipped(self.mechanism, parameters, ports)
         self.dt = checked('dt', dt, lambda v: v > 0.0, 'a positive number of seconds')
-        self.power_flow_deadband = power_flow_deadband
         self.initial_velocity = initial_velocity
-        self._substeps = None
-        self.adopt(self.prepare(parameters, substeps, ports))
+        self._ticker = self.prepare(parameters, substeps, ports)
+        self.power_flow_deadband = power_flow_deadband
         self.reset()
 
     @property
@@ -67,7 +65,7 @@ class Simulation:
     @property
     def language(self):
         """What the steps are made in, 'C' or 'Python', to the same bits, see ``dm_ros.core``."""
-        return self._model.language
+        return self._ticker.language
 
     @property
     def shafts(self):
@@ -92,7 +90,7 @@ class Simulation:
     @property
     def force_limits(self):
         """Largest force on each clutch, N; larger commands are clamped to it."""
-        return tuple([actuator.limit for actuator in self._actuators])
+        return tuple([actuator.limit for actuator in self._ticker.run.actuators])
 
     @property
     def moments(self):
@@ -102,27 +100,27 @@ class Simulation:
     @property
     def time(self):
         """Simulated time, s."""
-        return self._ticks * self.dt
+        return self._ticker.ticks * self.dt
 
     @property
     def ticks(self):
         """Ticks since the start."""
-        return self._ticks
+        return self._ticker.ticks
 
     @property
     def coarse_steps(self):
         """Solver steps since the start that reached the bound of work, see ``adaptive``."""
-        return self._coarse_steps
+        return self._ticker.coarse_steps
 
     @property
     def power_flow_deadband(self):
         """Difference of power within which the index stays what it is, W."""
-        return self._deadband
+        return self._ticker.deadband
 
     @power_flow_deadband.setter
     def power_flow_deadband(self, value):
-        self._deadband = checked('power_flow_deadband', value, lambda v: v >= 0.0,
-                                 'a number of watts that is not negative')
+        self._ticker.deadband = checked('power_flow_deadband', value, lambda v: v >= 0.0,
+                                        'a number of watts that is not negative')
 
     @property
     def initial_velocity(self):
@@ -143,7 +141,7 @@ class Simulation:
     @property
     def substeps(self):
         """Solver steps in a tick."""
-        return self._substeps
+        return self._ticker.run.substeps
 
     @substeps.setter
     def substeps(self, value):
@@ -157,7 +155,7 @@ class Simulation:
         They may be set between two ticks, also by a mapping of those that change; the speeds
         of the output shafts and all angles go on from where they are.
         """
-        return self._model.parameters
+        return self._ticker.model.parameters
 
     @parameters.setter
     def parameters(self, parameters):
@@ -167,7 +165,7 @@ class Simulation:
     def ports(self):
         """``{shaft: (stiffness, damping)}`` of the ports that take a speed, N m/rad, N m s/rad."""
         return {shaft: (half_shaft.stiffness, half_shaft.damping) for shaft, half_shaft
-                in zip(self.mechanism.half_shafts, self._model.half_shafts)}
+                in zip(self.mechanism.half_shafts, self._ticker.model.half_shafts)}
 
     @ports.setter
     def ports(self, ports):
@@ -180,14 +178,11 @@ class Simulation:
 
         One that a simulation of the same variant, law and parameters had may be put back.
         """
-        return State(self._x, self._turned, self._origin, self._torque, self._flow,
-                     self._memory, self._force, self._held)
+        return self._ticker.state
 
     @state.setter
     def state(self, state):
-        (self._x, self._turned, self._origin, self._torque, self._flow,
-         self._memory, self._force, self._held) = state
-        self._point = None
+        self._ticker.state = state
 
     def prepare(self, parameters, substeps=None, ports=None):
         """
@@ -206,20 +201,28 @@ class Simulation:
         if parameters.has_clutches and not self.mechanism.clutches:
             raise ValueError(f'{parameters.prefix}.clutch: what began without clutches cannot get '
                              'any while it runs; friction_surfaces must be set at the start')
-        substeps = checked('substeps', self._substeps if substeps is None else substeps,
+        substeps = checked('substeps', self.substeps if substeps is None else substeps,
                            lambda v: v >= 1 and v == int(v), 'a positive integer')
         ports = self.ports if ports is None else checked_ports(ports, self.inputs)
         if set(ports) != set(self.mechanism.half_shafts):
             raise ValueError('ports: which shafts take a speed cannot change while it runs')
-        return (model_with(ports, self._variant.formulation, self.mechanism, self.loss_law,
-                           parameters, self.dt / substeps), int(substeps))
+        model = model_with(ports, self._variant.formulation, self.mechanism, self.loss_law,
+                           parameters, self.dt / substeps)
+        mechanism = self.mechanism
+        run = Run(int(substeps), self.dt, actuators_of(parameters, mechanism.clutches, self.dt),
+                  mechanism.shafts, mechanism.outputs,
+                  tuple([port.idle for port in mechanism.ports]))
+        return self._made(model, run)
+
+    def _made(self, model, run, books=None):
+        return ticker_of(model, run, books)
 
     def _table(self, parameters):
         """Return a table of parameters, or those in force with a mapping of changes."""
         kind = self._variant.mechanism.parameters
         if isinstance(parameters, kind):
             return parameters
-        now = self._model.parameters if self._model else kind()
+        now = self._ticker.model.parameters if self._ticker else kind()
         try:
             return now.changed(dict(parameters))
         except TypeError:
@@ -228,38 +231,30 @@ class Simulation:
 
     def adopt(self, prepared):
         """Take what ``prepare`` made; the speeds of the output shafts and all angles go on."""
-        old = self._model
-        self._model, self._substeps = prepared
-        self._actuators = actuators_of(self._model.parameters, self.clutches, self.dt)
-        if old is not None:
-            self._origin = self._positions(old)
-            self._turned = (0.0, 0.0)
-            velocity = dict(zip(self.shafts, old.all_shafts(self._x)))
-            outputs = (velocity[shaft] for shaft in self.outputs)
-            self._x = *self._model.independent(*outputs), *self._x[2:]   # and the twists
-            self._point = None
+        prepared.follow(self._ticker)
+        self._ticker = prepared
 
     def reset(self):
         """Go back to the start: time, angles, torques, forces zero, initial speeds, index +1."""
-        self._ticks = 0
-        self._coarse_steps = 0
-        model = self._model
-        idle = tuple(port.idle for port in self.mechanism.ports)
-        twists = (0.0,) * len(self.mechanism.half_shafts)
-        self.state = State(
-            x=(*model.independent(*self._initial_velocity), *twists), turned=(0.0, 0.0),
-            origin=(0.0,) * len(self.shafts), torque=(0.0,) * len(self.inputs),
-            power_flow=DIRECT, memory=(0.0, 0.0) if model.lagged else (),
-            force=(0.0,) * len(self.clutches), held=idle)
+        self._ticker.reset(self._initial_velocity)
 
     def step(self, torques, clutch_forces=NO_FORCE):
         """Advance one tick, as ``advance``, and return its ``Snapshot``."""
-        self.advance(torques, clutch_forces)
-        return self.snapshot()
+        return tuple.__new__(Snapshot, self._stepped(torques, clutch_forces))
+
+    def _stepped(self, torques, clutch_forces):
+        """Advance one tick and return what is reported of it."""
+        try:
+            if reported := self._ticker.quick(torques, clutch_forces, True):
+                return reported
+        except ArithmeticError:
+            pass   # it gets its words there
+        self._checked_tick(torques, clutch_forces)
+        return self._ticker.report()
 
     def advance(self, torques, clutch_forces=NO_FORCE):
         """
-        Advance one tick; return the solver steps that did it, as ``models`` tells them.
+        Advance one tick.
 
         :param torques: N m, in the order of ``inputs``, held in the tick. For a speed port it is
             the speed outside instead, rad/s, or None where nothing holds the outside: the shaft
@@ -271,57 +266,27 @@ class Simulation:
             inputs or clutches, for a force below 0, or for what leads out of the range of floating
             point numbers; the state stays what it was.
         """
-        T = self._checked_torques(torques)
-        force = self._pressed(clutch_forces)
-        model, deadband = self._model, self._deadband
-        x, memory, flow = self._x, self._memory, self._flow
-        lagged, point = model.lagged, self._point
-        if lagged and point is None:
-            point = model.point(x, model.friction(memory, self._force), self._held, flow)
-        S = model.friction(memory, force)
-        turned_1, turned_2 = self._turned
-        coarse_steps = 0
-        steps = []
         try:
-            for _ in range(self._substeps):
-                was, flow = flow, model.flow(x, T, deadband, flow)
-                if lagged:
-                    memory = model.remembered(point, was)
-                    S = model.friction(memory, force)
-                step = model.step(x, S, T, flow)
-                _, _, x, integral, point, coarse, _ = step
-                turned_1 += integral[0]
-                turned_2 += integral[1]
-                coarse_steps += coarse
-                steps.append(step)
-            in_range = math.isfinite(sum(x) + turned_1 + turned_2)
+            if self._ticker.quick(torques, clutch_forces, False) is not None:
+                return
         except ArithmeticError:
-            in_range = False
-        if not in_range:
-            raise ValueError(f'torques: {T} lead out of the range of floating point numbers')
-        self._x, self._turned, self._held = x, (turned_1, turned_2), T
-        self._torque = model.mean_torques(T, steps) if model.half_shafts else T
-        self._flow, self._memory, self._point, self._force = flow, memory, point, force
-        self._coarse_steps += coarse_steps
-        self._ticks += 1
-        return steps
+            pass
+        self._checked_tick(torques, clutch_forces)
+
+    def _checked_tick(self, torques, clutch_forces):
+        T = self._checked_torques(torques)
+        try:
+            self._ticker.tick(T, self._checked_forces(clutch_forces))
+        except ArithmeticError:
+            raise ValueError(
+                f'torques: {T} lead out of the range of floating point numbers') from None
 
     def snapshot(self):
         """Return the ``Snapshot`` of the last tick, or of the start at zero torque."""
-        return Snapshot(*self._report())
-
-    def _report(self):
-        model, x, T, flow = self._model, self._x, self._held, self._flow
-        if self._point is None:
-            self._point = model.point(x, model.friction(self._memory, self._force), T, flow)
-        return (self._ticks * self.dt, model.all_shafts(x), self._positions(model), self._torque,
-                model.internal_moments(x, T, flow, self._point), flow, self._force)
-
-    def _positions(self, model):
-        return tuple(map(add, self._origin, model.all_shafts(self._turned)))
+        return tuple.__new__(Snapshot, self._ticker.report())
 
     def _checked_torques(self, torques):
-        if self._model.half_shafts:
+        if self.mechanism.half_shafts:
             return self._checked_inputs(torques)
         T = numbers_for('torques', torques, self.mechanism.ports)
         if not math.isfinite(sum(T)):   # as nearly never
@@ -345,11 +310,11 @@ class Simulation:
         refuse('torques', values, ports)
         return tuple([None if gone else value for gone, value in zip(free, values)])
 
-    def _pressed(self, commands):
-        """Return the forces in force in the next tick."""
-        if commands is NO_FORCE and not any(self._force):
-            return self._force
+    def _checked_forces(self, commands):
+        """Return what the actuators are told, N."""
         ports = self.mechanism.actuators
+        if commands is NO_FORCE:
+            return NO_FORCE
         if not ports:
             # a numpy array is no tuple
             if not hasattr(commands, '__iter__') or tuple(commands) not in ((), NO_FORCE):
@@ -357,5 +322,4 @@ class Simulation:
             return ()
         A = numbers_for('clutch_forces', commands, ports)
         refuse('clutch_forces', A, ports)
-        return tuple([actuator.follow(force, command) for actuator, force, command
-                      in zip(self._actuators, self._force, A)])
+        return A

@@ -1,0 +1,187 @@
+/* Copyright 2026 dm_ros developers
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Many differentials at once, for dm_ros/ensemble.py: their models, states and known patterns lie
+ * one after the other in memory that Python owns, and are stepped with the interpreter free.
+ */
+
+#include "python.h"
+
+#include <string.h>
+
+#include "differential.h"
+
+enum { ROOM = 2 };   /* patterns of signs that are kept */
+
+/* One of many, beside its model. */
+typedef struct {
+    state now;
+    int failed;
+    patterns known;
+    pattern kept[ROOM];
+} member;
+
+/* The buffers of a call; each that was taken is given back. */
+enum { MODELS, MEMBERS, TORQUES, FORCES, OUT, BUFFERS };
+
+typedef struct {
+    Py_buffer view[BUFFERS];
+    int taken[BUFFERS];
+} buffers;
+
+static void give_back(buffers *b)
+{
+    for (int n = 0; n < BUFFERS; n++)
+        if (b->taken[n])
+            PyBuffer_Release(&b->view[n]);
+}
+
+/* Take a buffer of at least so many bytes; return 0 and set an error if it is none. */
+static int take(buffers *b, int which, PyObject *object, int flags, Py_ssize_t least)
+{
+    if (PyObject_GetBuffer(object, &b->view[which], flags) < 0)
+        return 0;
+    b->taken[which] = 1;
+    if (b->view[which].len < least) {
+        PyErr_Format(PyExc_ValueError, "buffer %d has %zd bytes, of %zd", which,
+                     b->view[which].len, least);
+        return 0;
+    }
+    return 1;
+}
+
+static patterns *known_of(member *one)
+{
+    one->known.room = ROOM;
+    one->known.kept = one->kept;   /* the memory may have moved */
+    return &one->known;
+}
+
+static const char DOC_RESET[] =
+    "reset_all(models, members, velocity, first, last)\n--\n\n"
+    "Put some members back to the start, with the speeds velocity (n, 2) of the outputs, rad/s.";
+
+static PyObject *reset_all(PyObject *module, PyObject *args)
+{
+    PyObject *models, *members, *velocity;
+    Py_ssize_t first, last;
+    buffers b = {0};
+    (void)module;
+    if (!PyArg_ParseTuple(args, "OOOnn", &models, &members, &velocity, &first, &last))
+        return NULL;
+    if (take(&b, MODELS, models, PyBUF_SIMPLE, last * (Py_ssize_t)sizeof(model))
+        && take(&b, MEMBERS, members, PyBUF_WRITABLE, last * (Py_ssize_t)sizeof(member))
+        && take(&b, OUT, velocity, PyBUF_SIMPLE, last * 2 * (Py_ssize_t)sizeof(double))) {
+        const model *m = b.view[MODELS].buf;
+        member *all = b.view[MEMBERS].buf;
+        const double *omega = b.view[OUT].buf;
+        for (Py_ssize_t n = first; n < last; n++) {
+            dm_reset(&m[n], &all[n].now, &omega[2 * n]);
+            all[n].failed = 0;
+        }
+    }
+    give_back(&b);
+    if (PyErr_Occurred())
+        return NULL;
+    Py_RETURN_NONE;
+}
+
+static const char DOC_STEP[] =
+    "step_all(models, members, torques, forces, ticks, of_tick, of_member, first, last)\n--\n\n"
+    "Advance some members by some ticks, without the interpreter.\n\n"
+    "Torques are doubles, N m, those of a tick and a member begin at tick of_tick + member\n"
+    "of_member; forces, N, likewise with 2/3 of that, or None. A member whose tick leads out of\n"
+    "the range of numbers fails: it stays where it was.";
+
+static PyObject *step_all(PyObject *module, PyObject *args)
+{
+    PyObject *models, *members, *torques, *forces;
+    Py_ssize_t ticks, of_tick, of_member, first, last;
+    buffers b = {0};
+    (void)module;
+    if (!PyArg_ParseTuple(args, "OOOOnnnnn", &models, &members, &torques, &forces, &ticks, &of_tick,
+                          &of_member, &first, &last))
+        return NULL;
+    const Py_ssize_t places = (ticks - 1) * of_tick + (last - 1) * of_member + 1;
+    const Py_ssize_t size = (Py_ssize_t)sizeof(double);
+    if (take(&b, MODELS, models, PyBUF_SIMPLE, last * (Py_ssize_t)sizeof(model))
+        && take(&b, MEMBERS, members, PyBUF_WRITABLE, last * (Py_ssize_t)sizeof(member))
+        && take(&b, TORQUES, torques, PyBUF_SIMPLE, places * PORTS * size)
+        && (forces == Py_None
+            || take(&b, FORCES, forces, PyBUF_SIMPLE, places * CLUTCHES * size))) {
+        const model *m = b.view[MODELS].buf;
+        member *all = b.view[MEMBERS].buf;
+        const double *T = b.view[TORQUES].buf;
+        const double *A = b.taken[FORCES] ? b.view[FORCES].buf : NULL;
+        Py_BEGIN_ALLOW_THREADS
+        for (Py_ssize_t n = first; n < last; n++) {
+            patterns *known = known_of(&all[n]);
+            for (Py_ssize_t t = 0; t < ticks && !all[n].failed; t++) {
+                const Py_ssize_t place = t * of_tick + n * of_member;
+                all[n].failed = dm_tick(&m[n], &all[n].now, known, T + PORTS * place,
+                                        A ? A + CLUTCHES * place : NULL, NULL, NULL);
+            }
+        }
+        Py_END_ALLOW_THREADS
+    }
+    give_back(&b);
+    if (PyErr_Occurred())
+        return NULL;
+    Py_RETURN_NONE;
+}
+
+static const char DOC_REPORT[] =
+    "report_all(models, members, out, first, last)\n--\n\n"
+    "Put what some members report into out, doubles (n, 20): velocity (5), position (5), moment\n"
+    "(5), power flow, clutch forces (2), coarse steps, whether it failed.";
+
+static PyObject *report_all(PyObject *module, PyObject *args)
+{
+    enum { COLUMNS = SHAFTS + SHAFTS + MOMENTS + 5 };
+    PyObject *models, *members, *out;
+    Py_ssize_t first, last;
+    buffers b = {0};
+    (void)module;
+    if (!PyArg_ParseTuple(args, "OOOnn", &models, &members, &out, &first, &last))
+        return NULL;
+    if (take(&b, MODELS, models, PyBUF_SIMPLE, last * (Py_ssize_t)sizeof(model))
+        && take(&b, MEMBERS, members, PyBUF_WRITABLE, last * (Py_ssize_t)sizeof(member))
+        && take(&b, OUT, out, PyBUF_WRITABLE, last * COLUMNS * (Py_ssize_t)sizeof(double))) {
+        const model *m = b.view[MODELS].buf;
+        member *all = b.view[MEMBERS].buf;
+        double *values = b.view[OUT].buf;
+        Py_BEGIN_ALLOW_THREADS
+        for (Py_ssize_t n = first; n < last; n++) {
+            const state *now = &all[n].now;
+            double *row = &values[n * COLUMNS];
+            report told = {{0.0}, {0.0}, {0.0}};
+            dm_report(&m[n], now, known_of(&all[n]), &told);
+            memcpy(row, &told, sizeof told);
+            row += SHAFTS + SHAFTS + MOMENTS;
+            *row++ = now->flow;
+            *row++ = now->force[0];
+            *row++ = now->force[1];
+            *row++ = now->coarse_steps;
+            *row++ = all[n].failed;
+        }
+        Py_END_ALLOW_THREADS
+    }
+    give_back(&b);
+    if (PyErr_Occurred())
+        return NULL;
+    Py_RETURN_NONE;
+}
+
+static PyMethodDef functions[] = {
+    {"reset_all", reset_all, METH_VARARGS, DOC_RESET},
+    {"step_all", step_all, METH_VARARGS, DOC_STEP},
+    {"report_all", report_all, METH_VARARGS, DOC_REPORT},
+    {NULL, NULL, 0, NULL},
+};
+
+int dm_add_ensemble(PyObject *module)
+{
+    return PyModule_AddFunctions(module, functions)
+        || PyModule_AddIntConstant(module, "MODEL", sizeof(model))
+        || PyModule_AddIntConstant(module, "MEMBER", sizeof(member)) ? -1 : 0;
+}
