@@ -194,7 +194,7 @@ static int find(const model *m, const state *now, patterns *known, moved *found)
     return job->broken ? -1 : 0;
 }
 
-/* Take the exact step of the signs at x; where there is none, the job starts from what is known. */
+/* Take the exact step of the signs at x; where there is none, the job starts from its point. */
 static void pattern_step(const model *m, patterns *known, pair x, const double *T, moved *did)
 {
     const coefficients *k = &m->law.passive;

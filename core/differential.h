@@ -15,6 +15,8 @@
 
 enum { SHAFTS = 5, PORTS = 3, MOMENTS = 5, CLUTCHES = 2 };   /* at most */
 
+enum { SYMMETRIC = 37, SELF_LOCKING = 33 };   /* parameters of each mechanism */
+
 /* What a run has beside its parameters; all numbers, as Python packs them. */
 typedef struct {
     double is_symmetric, is_passive, is_lagged, has_clutches;
@@ -104,7 +106,7 @@ void dm_book_tick(const model *, const state *, const double *tick, books *);
 int dm_tick(const model *, state *, patterns *known, const double *torques, const double *forces,
             books *kept, report *told);
 
-/* Put what is reported after the last tick, or at the start, into told; return 0 or -1 as above. */
+/* Put what is reported after the last tick, or at the start, into told; return 0 or -1. */
 int dm_report(const model *, const state *, patterns *known, report *told);
 
 #endif

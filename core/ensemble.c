@@ -57,6 +57,38 @@ static patterns *known_of(member *one)
     return &one->known;
 }
 
+static const char DOC_MAKE[] =
+    "make_all(setup, parameters, models, first, last)\n--\n\n"
+    "Make some models of the rows of parameters, doubles in the order of their table.\n\n"
+    ":param setup: bytes of the doubles of struct setup, for all.\n"
+    ":return: the first row of which no model can be made, or last.";
+
+static PyObject *make_all(PyObject *module, PyObject *args)
+{
+    PyObject *parameters, *models;
+    const char *bytes;
+    Py_ssize_t size, first, last;
+    setup run;
+    buffers b = {0};
+    (void)module;
+    if (!PyArg_ParseTuple(args, "y#OOnn", &bytes, &size, &parameters, &models, &first, &last)
+        || !dm_copied("setup", bytes, size, &run, sizeof run))
+        return NULL;
+    const Py_ssize_t columns = run.is_symmetric != 0.0 ? SYMMETRIC : SELF_LOCKING;
+    if (take(&b, TORQUES, parameters, PyBUF_SIMPLE,
+             last * columns * (Py_ssize_t)sizeof(double))
+        && take(&b, MODELS, models, PyBUF_WRITABLE, last * (Py_ssize_t)sizeof(model))) {
+        const double *rows = b.view[TORQUES].buf;
+        model *m = b.view[MODELS].buf;
+        Py_BEGIN_ALLOW_THREADS
+        while (first < last && !dm_make(&m[first], &run, &rows[first * columns]))
+            first++;
+        Py_END_ALLOW_THREADS
+    }
+    give_back(&b);
+    return PyErr_Occurred() ? NULL : PyLong_FromSsize_t(first);
+}
+
 static const char DOC_RESET[] =
     "reset_all(models, members, velocity, first, last)\n--\n\n"
     "Put some members back to the start, with the speeds velocity (n, 2) of the outputs, rad/s.";
@@ -99,8 +131,8 @@ static PyObject *step_all(PyObject *module, PyObject *args)
     Py_ssize_t ticks, of_tick, of_member, first, last;
     buffers b = {0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "OOOOnnnnn", &models, &members, &torques, &forces, &ticks, &of_tick,
-                          &of_member, &first, &last))
+    if (!PyArg_ParseTuple(args, "OOOOnnnnn", &models, &members, &torques, &forces, &ticks,
+                          &of_tick, &of_member, &first, &last))
         return NULL;
     const Py_ssize_t places = (ticks - 1) * of_tick + (last - 1) * of_member + 1;
     const Py_ssize_t size = (Py_ssize_t)sizeof(double);
@@ -173,6 +205,7 @@ static PyObject *report_all(PyObject *module, PyObject *args)
 }
 
 static PyMethodDef functions[] = {
+    {"make_all", make_all, METH_VARARGS, DOC_MAKE},
     {"reset_all", reset_all, METH_VARARGS, DOC_RESET},
     {"step_all", step_all, METH_VARARGS, DOC_STEP},
     {"report_all", report_all, METH_VARARGS, DOC_REPORT},

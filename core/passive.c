@@ -8,8 +8,15 @@
 
 #include "passive.h"
 
-static const double STRAIGHT = 0.02;
+static const double STRAIGHT = 0.02, TINY = 1e-280;
 enum { ROUNDS = 8, NEWTON = 30 };
+
+/* Return the pattern of signs of a number, its last five digits by two. */
+static signs pattern_of(int n)
+{
+    return (signs){n & 16 ? -1.0 : 1.0, n & 8 ? -1.0 : 1.0, n & 4 ? -1.0 : 1.0,
+                   n & 2 ? 0.0 : 1.0, n & 1 ? 0.0 : 1.0};
+}
 
 /*
  * Solve the equations at given signs, in the state of the result; return by how much the solution
@@ -112,6 +119,22 @@ static double solve(step *job, double q_1, double q_2, signs sign, signs *found,
     return wrong;
 }
 
+int dm_has_solutions(const coefficients *k)
+{
+    step job = {.coefficients = k, .u = {1.0, 1.0, 1.0, 0.0, 0.0}};
+    for (int n = 0; n < 64; n++) {
+        const double turned = n & 32 ? -1.0 : 1.0;
+        const signs sign = pattern_of(n);
+        signs found;
+        point at = {.state = {1.0, turned, 1.0, 1.0, 1.0, turned, -turned}};
+        solve(&job, -1.0, -1.0, sign, &found, &at);
+        const double sum = at.e_0 + at.e_s + at.F_1 + at.F_2 + at.M_1 + at.M_2 + at.M_F;
+        if (job.broken || !(at.solved[SOLVED - 1] > TINY) || !isfinite(sum))
+            return 0;
+    }
+    return 1;
+}
+
 /* Put w, s and the tanh of each sign into state, or what is known of the same speeds. */
 static void find_state(step *job, double w, double s, double *state)
 {
@@ -150,9 +173,7 @@ static void evaluate(step *job, double w, double s, point *at)
     point best = *at;
     double least = 0.0;
     for (int n = 0; n < 32; n++) {
-        sign = (signs){n & 16 ? -1.0 : 1.0, n & 8 ? -1.0 : 1.0, n & 4 ? -1.0 : 1.0,
-                       n & 2 ? 0.0 : 1.0, n & 1 ? 0.0 : 1.0};
-        const double wrong = solve(job, q_1, q_2, sign, &found, at);
+        const double wrong = solve(job, q_1, q_2, pattern_of(n), &found, at);
         if (n == 0 || wrong < least) {
             least = wrong;
             best = *at;

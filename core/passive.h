@@ -21,6 +21,9 @@ enum { T_IN, T_ONE, T_TWO, S_ONE, S_TWO };
 
 extern const law dm_passive;
 
+/* Return whether the numbers of all sets of signs stay in the range of floating point. */
+int dm_has_solutions(const coefficients *);
+
 /* Put the power that each element takes into lost, W. */
 void dm_lost_powers(const step *job, const point *at, double *lost);
 

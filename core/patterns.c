@@ -190,8 +190,8 @@ int dm_pattern_step(const pattern *p, pair x, const double *T, pair *end, pair *
             return 0;
         const double slope = c[0] * v_w + c[1] * v_s;
         const double slope_end = c[0] * v_w_end + c[1] * v_s_end;
-        if (slope * slope_end < 0.0
-            && (f < f_end ? f : f_end) <= p->reach[0] * fabs(slope) + p->reach[1] * fabs(slope_end))
+        const double down = p->reach[0] * fabs(slope) + p->reach[1] * fabs(slope_end);
+        if (slope * slope_end < 0.0 && (f < f_end ? f : f_end) <= down)
             return 0;
     }
     return 1;

@@ -1,7 +1,7 @@
 /* Copyright 2026 dm_ros developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * What the parts of the module dm_ros._core share: numbers from Python and back, by its stable ABI.
+ * What the parts of the module dm_ros._core share, by the stable ABI of Python.
  */
 
 #ifndef DM_ROS_PYTHON_H
@@ -16,10 +16,10 @@ int dm_numbers(PyObject *tuple, const char *what, int count, double *into);
 
 PyObject *dm_tuple(int count, const double *values);
 
-/* Copy bytes into a struct, whose alignment they may not have; return 0 and set an error if not. */
+/* Copy bytes into a struct, whose alignment they may not have; return 0 with an error if not. */
 int dm_copied(const char *what, const char *bytes, Py_ssize_t size, void *into, size_t expected);
 
-/* Add the type Ticker, and the functions for many, to the module; return 0, or -1 with an error. */
+/* Add the type Ticker, and the functions for many; return 0, or -1 with an error. */
 int dm_add_ticker(PyObject *module);
 int dm_add_ensemble(PyObject *module);
 

@@ -131,7 +131,8 @@ static PyObject *tick(PyObject *object, PyObject *args)
     if (!PyArg_UnpackTuple(args, "tick", 2, 2, &given, &commands))
         return NULL;
     if (!plain(given, PORTS, -INFINITY, T) || !plain_forces(self, commands, forces)) {
-        PyErr_SetString(PyExc_TypeError, "torques and forces must be finite numbers, one for each");
+        PyErr_SetString(PyExc_TypeError,
+                        "torques and forces must be finite numbers, one for each");
         return NULL;
     }
     if (dm_tick(&self->m, &self->now, &self->known, T, forces,
@@ -264,8 +265,8 @@ static PyObject *booked(PyObject *object, PyObject *unused)
 
 static PyMethodDef methods[] = {
     {"quick", quick, METH_VARARGS,
-     "quick(torques, forces, is_told)\n--\n\nAdvance one tick and return what is reported of it, or "
-     "(); return None, and do nothing, where\nthese are not plain finite numbers, one for each."},
+     "quick(torques, forces, is_told)\n--\n\nAdvance one tick and return what is reported of it, "
+     "or (); return None, and do nothing,\nwhere these are not plain finite numbers."},
     {"tick", tick, METH_VARARGS, "tick(T, commands)\n--\n\nAdvance one tick."},
     {"report", reported, METH_NOARGS, "report()\n--\n\nReturn what a Snapshot holds."},
     {"reset", reset, METH_O, "reset(velocity)\n--\n\nGo back to the start."},

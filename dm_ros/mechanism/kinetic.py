@@ -3,29 +3,14 @@
 
 """The kinetic energy of a mechanism, a quadratic form (m_11, m_12, m_22) in two speeds."""
 
-import numpy as np
 
-from dm_ros.mechanism import self_locking, symmetric
-from dm_ros.mechanism.symmetric import TO_SLIP
-
-
-def kinetic_form(inertias, shafts):
-    """Return (m_11, m_12, m_22): kinetic energy is (m_11 x_1^2 + m_22 x_2^2)/2 + m_12 x_1 x_2."""
-    m = shafts.T @ (np.array(inertias)[:, None] * shafts)
-    return float(m[0, 0]), float(m[0, 1]), float(m[1, 1])
-
-
-def symmetric_form(p):
-    """Return the form of the kinetic energy of a symmetric differential in (w, s)."""
-    return kinetic_form((p.I_0, p.I_1, p.I_2, p.I_3, p.n_s * p.I_s),
-                        symmetric.kinematics(p) @ np.linalg.inv(TO_SLIP))
-
-
-def self_locking_form(p):
-    """Return the form of the kinetic energy of a self-locking differential in (w, s)."""
-    return kinetic_form(
-        (p.I_0, p.I_1, p.I_2, p.n_s * p.I_s),
-        self_locking.kinematics(p) @ np.linalg.inv(self_locking.slip_coordinates(p)))
+def kinetic_form(p):
+    """Return the form of the kinetic energy in (w, s) of a table of parameters."""
+    g_F, I_3 = getattr(p, 'g_F', 0.0), getattr(p, 'I_3', 0.0)
+    k_1, k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
+    spin = k_2 / p.g_2s   # of the satellites, over the slip
+    return (p.I_0 + p.I_1 + p.I_2 + I_3 * g_F * g_F, p.I_1 * k_1 - p.I_2 * k_2,
+            p.I_1 * k_1 * k_1 + p.I_2 * k_2 * k_2 + p.n_s * p.I_s * spin * spin)
 
 
 def kinetic_energy(m, x):

@@ -61,8 +61,9 @@ def symmetric_losses(p, direction):
 
 def symmetric_drag(p):
     """Return the first five of ``SymmetricLosses``."""
-    return (p.l_0 + p.l_3 * p.g_F**2, (p.l_1 + p.l_2 + p.n_s * p.l_s / p.g_2s**2) / 4,
-            p.l_3 * p.g_F**2, p.l_0, (p.l_1 - p.l_2) / 2)
+    g_3 = p.l_3 * p.g_F * p.g_F
+    return (p.l_0 + g_3, (p.l_1 + p.l_2 + p.n_s * p.l_s / (p.g_2s * p.g_2s)) / 4, g_3, p.l_0,
+            (p.l_1 - p.l_2) / 2)
 
 
 def symmetric(k, ww, ws, ss, M_F_w, M_1_w1, M_2_w2, M_1_w, M_2_w, T_3_w3):
@@ -111,7 +112,8 @@ def self_locking_losses(p, direction):
     direct = float(direction == DIRECT)
     k_1, k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
     return SelfLockingLosses(
-        k_1, k_2, p.l_0, p.l_1 * k_1**2 + p.l_2 * k_2**2 + p.n_s * p.l_s * (k_2 / p.g_2s)**2,
+        k_1, k_2, p.l_0,
+        p.l_1 * k_1 * k_1 + p.l_2 * k_2 * k_2 + p.n_s * p.l_s * (k_2 / p.g_2s) * (k_2 / p.g_2s),
         p.l_1 * k_1 - p.l_2 * k_2, 1 - p.eta_1G, 1 - p.eta_2G, lost_in_bearing(p.eta_0B), direct,
         1.0 - direct)
 

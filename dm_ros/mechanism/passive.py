@@ -94,7 +94,7 @@ def coefficients(p, clutches, proportional=True):
     """
     g_12 = getattr(p, 'g_12', 1.0)
     k_2 = 1 / (1 + g_12)
-    spin = p.n_s * k_2 / p.g_2s**2
+    spin = p.n_s * k_2 / (p.g_2s * p.g_2s)
     eta_F, eta_3B = getattr(p, 'eta_FG', 1.0), getattr(p, 'eta_3B', 1.0)
     a = slip_steepness(p) if clutches else (0.0, 0.0)
     phi, psi = proportional_friction(p) if clutches and proportional else ((0.0, 0.0), (0.0, 0.0))

@@ -20,7 +20,7 @@ between: what is ``Exact`` of an exact step, or ``(u, parts)`` of ``adaptive.ste
 import numpy as np
 
 from dm_ros.mechanism import clutched, losses, passive, symmetric
-from dm_ros.mechanism.kinetic import self_locking_form, symmetric_form
+from dm_ros.mechanism.kinetic import kinetic_form
 from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.motion import adaptive, held_torque
@@ -61,7 +61,7 @@ class Model:
         self.h = h
         self.g_12, self.g_2s, self.g_F = p.g_12, p.g_2s, getattr(p, 'g_F', 0.0)
         self.k_1, self.k_2 = p.g_12 / (1 + p.g_12), 1 / (1 + p.g_12)
-        self.form = (symmetric_form if self.g_F else self_locking_form)(p)
+        self.form = kinetic_form(p)
         self.phi, self.preload = (clutched.full_friction(p) if clutches
                                   else ((0.0, 0.0), (0.0, 0.0)))
 
