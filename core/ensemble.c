@@ -151,7 +151,7 @@ static PyObject *step_all(PyObject *module, PyObject *args)
             for (Py_ssize_t t = 0; t < ticks && !all[n].failed; t++) {
                 const Py_ssize_t place = t * of_tick + n * of_member;
                 all[n].failed = dm_tick(&m[n], &all[n].now, known, T + PORTS * place,
-                                        A ? A + CLUTCHES * place : NULL, NULL, NULL);
+                                        A ? A + CLUTCHES * place : NULL, NULL, NULL) != 0;
             }
         }
         Py_END_ALLOW_THREADS

@@ -1,0 +1,144 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Many differentials at once: the bits of single runs, all or none of the sets, failures apart."""
+
+from unittest import mock
+
+import numpy as np
+from properties import random_case
+import pytest
+
+from dm_ros import core, Ensemble, SelfLockingParameters, Simulation, VARIANTS
+from dm_ros.motion.models import LOSS_LAWS
+
+built = core._chosen('') is not None
+LANGUAGES = ['C', 'Python'] if built else ['Python']
+TICKS = 30
+
+
+@pytest.fixture(params=LANGUAGES)
+def language(request):
+    """Do it in this language."""
+    ticker = core._chosen('').Ticker if request.param == 'C' else None
+    with mock.patch.object(core, 'Ticker', ticker):
+        yield request.param
+
+
+def sets_of(variant, count, clutched=False):
+    """Return random tables of one variant."""
+    n, found = 0, []
+    while len(found) < count:
+        case = random_case(n, clutched)
+        found += [case.arguments['parameters']] * (case.variant == variant)
+        n += 1
+    return found
+
+
+@pytest.mark.parametrize('loss_law', LOSS_LAWS)
+@pytest.mark.parametrize('variant, clutched', [*((v, False) for v in VARIANTS),
+                                               ('symmetric_ode', True)])
+def test_each_member_moves_like_a_simulation_of_its_own(variant, clutched, loss_law, language):
+    sets, rng = sets_of(variant, 7, clutched), np.random.default_rng(5)
+    more = {'loss_law': loss_law, 'substeps': 2, 'power_flow_deadband': 3.0}
+    start = rng.normal(0, 50, (7, 2))
+    ensemble = Ensemble(variant, sets, 0.002, initial_velocity=start, threads=3, **more)
+    assert ensemble.language == language
+    T = rng.normal(0, 100, (TICKS, 7, 3))
+    A = rng.uniform(0, 500, (TICKS, 7, len(ensemble.clutches)))
+    singles = [Simulation(variant, 0.002, p, initial_velocity=speeds, **more)
+               for p, speeds in zip(sets, start.tolist())]
+    ensemble.run(T[:9], A[:9])   # at once, or tick by tick
+    for n in range(9, TICKS):
+        ensemble.step(T[n], A[n])
+    for simulation, torques, forces in zip(singles, T.swapaxes(0, 1), A.swapaxes(0, 1)):
+        for torque, force in zip(torques, forces):
+            simulation.advance(torque.tolist(), tuple(force.tolist()))
+    told = [simulation.snapshot() for simulation in singles]
+    for name in ('velocity', 'position', 'moment', 'power_flow', 'clutch_force'):
+        expected = np.array([getattr(snapshot, name) for snapshot in told], float)
+        assert getattr(ensemble, name).tobytes() == expected.tobytes(), name
+    assert ensemble.coarse_steps.tolist() == [s.coarse_steps for s in singles]
+    assert ensemble.time == singles[0].time and not ensemble.failed.any()
+    ensemble.reset()
+    assert ensemble.ticks == 0 and not ensemble.position.any()
+    assert ensemble.velocity[:, 1:3] == pytest.approx(start)
+
+
+def test_one_torque_is_for_all_and_threads_change_nothing(language):
+    masses = {'lsd.inertia.rear': np.linspace(0.005, 0.5, 600)}
+    runs = []
+    for threads in (1, 2, 5):
+        ensemble = Ensemble('lsd_ode', masses, threads=threads)
+        for _ in range(3):
+            ensemble.step((60.0, -10.0, -30.0), (100.0, 0.0))
+        runs.append(ensemble.velocity.tobytes())
+    assert len(set(runs)) == 1
+    assert np.all(np.diff(np.abs(ensemble.velocity[:, 0])) < 0.0)   # the heavier, the slower
+    assert ensemble.clutch_force.tolist() == [[100.0, 0.0]] * 600
+
+
+def test_a_member_that_leaves_the_range_of_numbers_fails_alone(language):
+    ensemble = Ensemble('symmetric_ode', [{}] * 3, loss_law='paper')
+    T = np.zeros((3, 3))
+    T[1] = 1e308
+    for _ in range(50):
+        ensemble.step(T)
+    assert ensemble.failed.tolist() == [False, True, False]
+    assert np.isnan(ensemble.velocity[1]).all() and not ensemble.velocity[[0, 2]].any()
+    ensemble.reset()
+    assert not ensemble.failed.any() and not ensemble.velocity.any()
+
+
+@pytest.mark.parametrize('sets, words', [
+    ([{}, {'lsd.inertia.rear': -1.0}],
+     r'parameters\[1\]: lsd.inertia.rear: -1.0 is not allowed, it must be in \(0, 1e\+06\]'),
+    ({'lsd.inertia.rear': [1.0, 1.0, np.nan]}, r'parameters\[2\]: lsd.inertia.rear: nan'),
+    ({'lsd.satellite_count': [4, 2.5]}, r'parameters\[1\]: lsd.satellite_count: 2.5'),
+    ([{'lsd.satellite_count': True}], r'parameters\[0\]: lsd.satellite_count: True'),
+    ([{'lsd.inertia.rear': '1'}], r"parameters\[0\]: lsd.inertia.rear: '1' is not allowed"),
+    ([{'lsd.inertia.rare': 1.0}], r'parameters\[0\]: lsd.inertia.rare: there is no such'),
+    ({'lsd.inertia.rare': 1.0}, 'lsd.inertia.rare: there is no such parameter'),
+    ({'lsd.inertia.rear': ['a']}, 'parameters: an array of numbers for each name'),
+    ({'lsd.inertia.rear': [1.0], 'lsd.inertia.front': [1.0, 2.0]}, 'arrays must be of one length'),
+    ([], 'there must be one set at least'),
+    (3, 'int is not a sequence of sets or a mapping of arrays'),
+    ([3], r'parameters\[0\]: int is not SelfLockingParameters or a mapping'),
+    ([{}, {'lsd.clutch.rear.friction_coefficient': 5.0}],
+     r'parameters\[1\]: lsd.clutch.rear: the clutch locks itself'),
+    ([SelfLockingParameters()] * 2 + [SelfLockingParameters(
+        I_0=1e-300, I_1=1e-300, I_2=1e-300, I_s=1e-300)],
+     r'parameters\[2\]: lsd: the equations of these parameters have no finite solution'),
+])
+def test_all_sets_are_checked_and_the_bad_one_is_named(sets, words, language):
+    with pytest.raises(ValueError, match=words):
+        Ensemble('lsd_ode', sets)
+
+
+def test_clutches_and_none_are_not_mixed(language):
+    with pytest.raises(ValueError, match=r'parameters\[1\]: symmetric.clutch: sets with'):
+        Ensemble('symmetric_ode', {'symmetric.clutch.left.friction_surfaces': [0, 2]})
+
+
+@pytest.mark.parametrize('torques, forces, words', [
+    ((1.0, 2.0), None, r'torques: they have the shape \(1, 2\), each must be of \(3,\) or'),
+    ([(1.0, 2.0, 3.0)] * 3, None, r'each must be of \(3,\) or \(2, 3\)'),
+    ((1.0, 2.0, np.inf), None, r'torques\[0\]: rear: inf is not allowed'),
+    ('abc', None, 'torques: they must be numbers, for carrier, front, rear'),
+    ((0.0,) * 3, (-1.0, 0.0), r'front: -1.0 is not allowed, it must be finite, in \[0, inf\]'),
+    ((0.0,) * 3, (1.0,), 'clutch_forces: they have the shape'),
+])
+def test_bad_inputs_are_named_and_nothing_moves(torques, forces, words, language):
+    ensemble = Ensemble('lsd_ode', [{}] * 2)
+    with pytest.raises(ValueError, match=words):
+        ensemble.step(torques, forces)
+    assert ensemble.ticks == 0 and not ensemble.velocity.any()
+
+
+def test_what_is_for_all_is_checked_as_by_a_simulation(language):
+    for more, words in (({'dt': 0.0}, 'dt: 0.0'), ({'substeps': 0}, 'substeps: 0'),
+                        ({'loss_law': 'none'}, 'loss_law'),
+                        ({'initial_velocity': (1e7, 0.0)}, 'initial_velocity: front: 10000000.0'),
+                        ({'variant': 'x'}, "variant: 'x'")):
+        with pytest.raises(ValueError, match=words):
+            Ensemble(**{'variant': 'lsd_ode', 'parameters': [{}], **more})
