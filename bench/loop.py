@@ -6,7 +6,8 @@ The benchmark of the loop: does the node hold its rate, beside a loop in C on th
 
 For each rate three loops run at the same time: one in C that sleeps to absolute deadlines, the
 node's own loop with nothing to do in Python, and the node with two publishers and a subscriber
-in processes of their own over DDS. It prints Markdown tables. Run ``make bench-loop``;
+in processes of their own over DDS. A second table has, in turn, the node with a model that does
+nothing, with one in C and with one in Python. It prints Markdown tables. Run ``make bench-loop``;
 ``python bench/loop.py --help`` has the options.
 """
 
@@ -60,6 +61,9 @@ int main(int argc, char **argv) {
 }
 """
 FLOOD = 10_000   # Hz
+MODELS = {   # and the choice of the core
+    'nothing': '', 'in C': 'c', 'in Python': 'python'}
+ROUNDS = 3       # of all of them in turn
 BESIDE = {'setter': 'parameters set at 10 Hz',
           'flood': f'a shaft flooded at up to {FLOOD:,} Hz'}
 LEGEND = """\
@@ -68,6 +72,12 @@ tick; `alone` those in a second in which the C loop, which ran at the same time,
 in the second before or after. `CPU` is that of the process, of one core. `round trip` is from the
 publishing of a torque in another process to the arrival there of the joint state that carries it.
 """
+COST_LEGEND = """
+What the model costs the node, {variant}, passive, with books, at {rate:g} Hz, while two torques
+come in at that rate: each node in turn, {rounds} times {seconds:g} s. `tick` is from the torques
+in force to the snapshot; `CPU` is that of the process, of one core, median over the rounds.
+"""
+COST_HEAD = ['model', 'tick mean, us', 'p99.9, us', 'worst, us', 'CPU', 'over that with nothing']
 HEAD = ['loop', 'rate held, Hz', 'lateness p50, us', 'p99, us', 'max, us', 'missed', 'alone',
         'ticks made', 'CPU', 'round trip p50, ms', 'p99, ms']
 
@@ -118,8 +128,27 @@ def python_loop(rate, seconds, path):
     timeline.write()
 
 
-def node(rate, variant, path):
-    """Run the node until SIGTERM."""
+def make_idle(simulation):
+    """Let a simulation do nothing in a tick: its snapshot is that of the start."""
+    start = simulation.snapshot()
+    simulation.step = lambda *_: start
+
+
+def time_ticks(plant):
+    """Return the times of the ticks that a plant makes from now on, s."""
+    tick, times = plant.tick, array('d')
+
+    def timed():
+        start = time.perf_counter()
+        snapshot = tick()
+        times.append(time.perf_counter() - start)
+        return snapshot
+    plant.tick = timed
+    return times
+
+
+def node(rate, variant, path, model=''):
+    """Run the node until SIGTERM, with one of ``MODELS`` timed, or as it is."""
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.parameter import Parameter
@@ -130,6 +159,9 @@ def node(rate, variant, path):
         Parameter('variant', value=variant), Parameter('rate', value=float(rate))])
     timeline = Timeline(path)
     differential.pacer = watched_pacer(rate, timeline)
+    if model == 'nothing':
+        make_idle(differential.plant.simulation)
+    times = time_ticks(differential.plant) if model else None
     executor = SingleThreadedExecutor()
     executor.add_node(differential)
     sys.setswitchinterval(SWITCH_INTERVAL)   # as main() of the node does
@@ -140,6 +172,8 @@ def node(rate, variant, path):
         if rclpy.ok():   # otherwise it is the shutdown that broke a call
             raise
     timeline.write()
+    if model:
+        path.with_suffix('.ticks').write_bytes(times.tobytes())
     differential.close()
     rclpy.try_shutdown()
 
@@ -289,6 +323,49 @@ def run_rate(rate, arguments, folder, c_loop, beside=None):
                      trips if name == 'node' else None) for name in rows]
 
 
+def run_model(model, rate, arguments, folder):
+    """Return the times of the ticks of a node, s, and its share of a core."""
+    me, path = [sys.executable, __file__], folder / 'node'
+    choice = {'DM_ROS_CORE': MODELS[model]} if MODELS[model] else {}
+    input_shaft, *others = variant_named(arguments.variant).mechanism.inputs
+    children = [subprocess.Popen([*map(str, (*me, 'node', rate, arguments.variant, path, model))],
+                                 env={**os.environ, **choice})]
+    children += [subprocess.Popen([*map(str, (*me, 'publisher', rate, shaft))])
+                 for shaft in (input_shaft, others[0])]
+    time.sleep(arguments.settle + arguments.duration)
+    for process in children:
+        process.send_signal(signal.SIGTERM)
+    for process in children:
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    times = np.frombuffer(path.with_suffix('.ticks').read_bytes())
+    return times[len(times) // 4:], json.loads(path.with_suffix('.json').read_text())['cpu']
+
+
+def print_models(rate, arguments, folder):
+    """Print what the model costs the node."""
+    found = {model: [] for model in MODELS}
+    for n in range(ROUNDS):
+        for model in MODELS:
+            sub = folder / f'{model} {n}'
+            sub.mkdir()
+            found[model].append(run_model(model, rate, arguments, sub))
+    print(COST_LEGEND.format(variant=arguments.variant, rate=rate, rounds=ROUNDS,
+                             seconds=arguments.duration))
+    print('| ' + ' | '.join(COST_HEAD) + ' |\n|---|' + '---:|' * (len(COST_HEAD) - 1))
+    nothing = np.median([cpu for _, cpu in found['nothing']])
+    for model, runs in found.items():
+        times = 1e6 * np.concatenate([times for times, _ in runs])
+        cpu = np.median([cpu for _, cpu in runs])
+        cells = [model, f'{times.mean():.1f}', f'{np.quantile(times, 0.999):.0f}',
+                 f'{times.max():.0f}', f'{100 * cpu:.1f} %',
+                 f'{100 * (cpu / nothing - 1):+.0f} %' if model != 'nothing' else '']
+        print('| ' + ' | '.join(cells) + ' |', flush=True)
+
+
 def compiled(folder):
     """Return the C loop, None where there is no compiler."""
     compiler = shutil.which('cc') or shutil.which('gcc')
@@ -312,11 +389,11 @@ def parser():
     return result
 
 
-def started_node(rate, variant, path):
+def started_node(rate, variant, path, model=''):
     """Run the node as ``differential`` does."""
     from dm_ros.ros.transport import prefer_udp
     prefer_udp()
-    node(float(rate), variant, Path(path))
+    node(float(rate), variant, Path(path), model)
 
 
 ROLES = {
@@ -350,6 +427,7 @@ def main():
             sub.mkdir()
             for cells in run_rate(rate, arguments, sub, c_loop, beside):
                 print('| ' + ' | '.join(cells) + ' |', flush=True)
+        print_models(arguments.rates[-1], arguments, Path(folder))
         if not c_loop:
             print('\nno C compiler here: no C loop')
 

@@ -60,7 +60,7 @@ the exact solution under held torques.
 
 - step: `Simulation.step`, with the snapshot. bare: `Simulation.advance`, without. With books:
   `AuditedSimulation.step`, which tells where the energy of the tick went.
-- in Python: without the core in C, which makes the adaptive steps where it is built.
+- in Python: without the core in C, which makes the ticks where it is built.
 - passive, paper: the law of losses; where none is named, it is the paper's.
 - lossless: the numpy pair and MuJoCo know no efficiencies; in their yardstick all are 1.
 - numpy matvec pair: Phi x + Gamma u and no more, without the index of power flow.
