@@ -226,13 +226,16 @@ static int advance(const model *m, patterns *known, const double *x, const doubl
     did->at = NULL;
     did->coarse = 0;
     did->numerical = 0.0;
-    prepare(m, T, S, flow, job);
     if (is_always_exact(m)) {
         did->exact = &m->law.exact[index_of(flow)];
         dm_exact_step(did->exact, from, T, &did->end, &did->integral);
-    } else if (has_patterns(m) && dm_has_pattern(&m->law.passive, from)) {
-        pattern_step(m, known, from, T, did);
+        if (!has_books)
+            return 0;
+    } else {
+        prepare(m, T, S, flow, job);
     }
+    if (has_patterns(m) && dm_has_pattern(&m->law.passive, from))
+        pattern_step(m, known, from, T, did);
     if (did->exact) {
         if (has_books)
             dm_exact_book(did->exact, m->g_F, m->h, from, did->end, did->integral, T, did->work,
@@ -305,47 +308,59 @@ int dm_report(const model *m, const state *now, patterns *known, report *told)
 int dm_tick(const model *m, state *now, patterns *known, const double *T, const double *commands,
             books *kept, report *told)
 {
-    state next = *now;
     moved did;
-    double S[CLUTCHES], tick[ENTRIES];
+    double x[2] = {now->x[0], now->x[1]}, turned[2] = {now->turned[0], now->turned[1]};
+    double memory[CLUTCHES] = {now->memory[0], now->memory[1]};
+    double force[CLUTCHES] = {now->force[0], now->force[1]};
+    double flow = now->flow, coarse_steps = now->coarse_steps, S[CLUTCHES], tick[ENTRIES];
+    const double *seen = now->seen;
     if (m->run.has_clutches != 0.0 && commands) {
         for (int n = 0; n < CLUTCHES; n++) {
             const double command = m->limit[n] < commands[n] ? m->limit[n] : commands[n];
-            next.force[n] = m->rise[n] == 1.0 ? command
-                            : next.force[n] + (command - next.force[n]) * m->rise[n];
+            force[n] = m->rise[n] == 1.0 ? command
+                                         : force[n] + (command - force[n]) * m->rise[n];
         }
     }
     const int lagged = m->run.is_lagged != 0.0, substeps = (int)m->run.substeps;
     if (lagged && find(m, now, known, &did))
         return -1;
-    friction(m, next.memory, next.force, S);
+    friction(m, memory, force, S);
     for (int n = 0; n < substeps; n++) {
-        const double was = m->run.is_passive != 0.0 ? 1.0 : next.flow;
-        next.flow = flow_of(m, next.x, T, next.flow);
+        const double was = m->run.is_passive != 0.0 ? 1.0 : flow;
+        flow = flow_of(m, x, T, flow);
         if (lagged) {
             const double M[CLUTCHES] = {was * did.at->M_1, was * did.at->M_2};
             for (int i = 0; i < CLUTCHES; i++)
-                next.memory[i] = M[i] >= 0.0 ? M[i] : -M[i] * m->coast[i];
-            friction(m, next.memory, next.force, S);
+                memory[i] = M[i] >= 0.0 ? M[i] : -M[i] * m->coast[i];
+            friction(m, memory, force, S);
         }
-        if (advance(m, known, next.x, S, T, next.flow, next.seen, kept != NULL, &did))
+        if (advance(m, known, x, S, T, flow, seen, kept != NULL, &did))
             return -1;
-        if (m->run.is_passive != 0.0 && did.at)
-            memcpy(next.seen, did.at->state, sizeof next.seen);
         if (kept)
-            dm_book_step(m, n == 0, next.x, &did.end, did.work, did.lost, did.numerical, tick);
-        next.x[0] = did.end.w;
-        next.x[1] = did.end.s;
-        next.turned[0] += did.integral.w;
-        next.turned[1] += did.integral.s;
-        next.coarse_steps += did.coarse;
+            dm_book_step(m, n == 0, x, &did.end, did.work, did.lost, did.numerical, tick);
+        if (m->run.is_passive != 0.0 && did.at)
+            seen = did.at->state;
+        x[0] = did.end.w;
+        x[1] = did.end.s;
+        turned[0] += did.integral.w;
+        turned[1] += did.integral.s;
+        coarse_steps += did.coarse;
     }
-    if (!isfinite(next.x[0] + next.x[1] + next.turned[0] + next.turned[1]))
+    if (!isfinite(x[0] + x[1] + turned[0] + turned[1]))
         return -1;
-    memcpy(next.torque, T, sizeof next.torque);
-    memcpy(next.held, T, sizeof next.held);
-    next.ticks += 1.0;
-    *now = next;
+    if (seen != now->seen)
+        memcpy(now->seen, seen, sizeof now->seen);
+    for (int n = 0; n < 2; n++) {
+        now->x[n] = x[n];
+        now->turned[n] = turned[n];
+        now->memory[n] = memory[n];
+        now->force[n] = force[n];
+    }
+    for (int n = 0; n < PORTS; n++)
+        now->torque[n] = now->held[n] = T[n];
+    now->flow = flow;
+    now->coarse_steps = coarse_steps;
+    now->ticks += 1.0;
     if (kept)
         dm_book_tick(m, now, tick, kept);
     if (told)

@@ -141,7 +141,8 @@ static void find_state(step *job, double w, double s, double *state)
     const coefficients *k = job->coefficients;
     const double speeds[2] = {w, s}, k_1s = k->k_1 * s, k_2s = k->k_2 * s;
     if (job->seen && !memcmp(job->seen, speeds, sizeof speeds)) {
-        memcpy(state, job->seen, STATE * sizeof *state);
+        if (state != job->seen)
+            memcpy(state, job->seen, STATE * sizeof *state);
         return;
     }
     state[0] = w;
