@@ -91,6 +91,7 @@ test-long: setup  ## run the long tests: random parameters by the 100,000, a day
 bench: .venv-bench/done  ## measure what a step costs, beside other tools, and how exact it is: BENCH_ARGS
 	env -u PYTHONPATH .venv-bench/bin/python bench/step.py $(BENCH_ARGS)
 	env -u PYTHONPATH .venv-bench/bin/python bench/half_shafts.py $(BENCH_ARGS)
+	env -u PYTHONPATH .venv-bench/bin/python bench/ensemble.py $(BENCH_ARGS)
 
 bench-loop: setup  ## measure how the node holds its rate, beside a loop in C: BENCH_ARGS
 	.venv/bin/python bench/loop.py $(BENCH_ARGS)
