@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dm_ros.files.parameter_file import default_text, read_parameter_file
+from dm_ros.files.parameter_file import default_text, read_parameter_file, written
 from dm_ros.mechanism.variants import SELF_LOCKING, SYMMETRIC
 from dm_ros.settings import NodeParameters
 
@@ -185,3 +185,13 @@ def test_every_parameter_of_the_node_can_stand_in_a_file(read):
     named = NodeParameters().named()
     lines = [f'    {name}: {text(value)}' for name, value in named.items()]
     assert read('/**:\n  ros__parameters:\n' + '\n'.join(lines)) == named
+
+
+def test_what_is_written_is_read_again_with_its_types(tmp_path):
+    values = {'variant': 'lsd_ode', 'joint_prefix': 'no', 'rate': 1e-1, 'substeps': 5,
+              'torque_limit': 1e6, 'lsd.inertia.front': 1e-5, 'lsd.inertia.rear': 0.1 + 0.2,
+              'use_sim_time': True, 'qos_overrides./clock.history': ['1', 'true']}
+    path = tmp_path / 'written.yaml'
+    path.write_text(written(values, {'lsd.inertia.front': '95 %: # no value'}, ['a: b', '# c']))
+    again = read_parameter_file(path)
+    assert again == values and list(map(type, again.values())) == list(map(type, values.values()))

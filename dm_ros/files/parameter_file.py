@@ -10,6 +10,7 @@ string), ``5`` is no double, a name may be nested or dotted. This reader sees wh
 without a word and nobody can have meant, such as a name given twice.
 """
 
+import json
 import re
 import sys
 import textwrap
@@ -246,6 +247,21 @@ def default_text(mechanism):
         unit = '' if row.unit == '1' else f', {row.unit}'
         branch[leaf] = _number(getattr(table(), symbol)), f'{symbol}{unit}: {row.description}'
     return HEADER.format(**mechanism._asdict()) + ''.join(_lines(tree, '    '))
+
+
+def written(values, comments, header):
+    """
+    Return the text of a parameter file.
+
+    :param values: ``{full name: value}``; comments: ``{full name: text}`` of some of them.
+    :param header: lines that stand above.
+    """
+    lines = [f'# {line}\n' for line in header] + ['/**:\n', '  ros__parameters:\n']
+    for name, value in values.items():
+        text = _number(value) if type(value) in (int, float) else json.dumps(value)
+        comment = f'  # {comments[name]}' if name in comments else ''
+        lines.append(f'    {name}: {text}{comment}\n')
+    return ''.join(lines)
 
 
 def _lines(tree, indent):
