@@ -52,6 +52,7 @@ setup(
             'compare_variants = dm_ros.commands:compare_variants',
             'demo = dm_ros.commands:demo',
             'differential = dm_ros.commands:differential',
+            'identify = dm_ros.commands:identify',
             'play_torques = dm_ros.commands:play_torques',
             'simulate = dm_ros.commands:simulate',
             'urdf = dm_ros.commands:urdf',

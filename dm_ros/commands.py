@@ -17,6 +17,7 @@ COMMANDS = {
     'compare_variants': ('tools.compare_variants', False),
     'demo': ('tools.demo', False),
     'differential': ('ros.node', True),
+    'identify': ('tools.identify', False),
     'play_torques': ('tools.play_torques', True),
     'simulate': ('tools.simulate', False),
     'urdf': ('tools.urdf', False),
@@ -35,7 +36,7 @@ def run(name, args=None):
     return import_module(f'dm_ros.{module}').main(args)
 
 
-bias, compare_variants, demo, differential, play_torques, simulate, urdf, watch = (
+bias, compare_variants, demo, differential, identify, play_torques, simulate, urdf, watch = (
     partial(run, name) for name in COMMANDS)
 
 
