@@ -38,7 +38,7 @@ endef
 # What .venv-lint, .venv-bench, .venv-docs and .venv-jazzy hold, and what colcon adds to .venv.
 lint := ruff==0.17.6
 bench := --editable . mujoco==4.0.0 control==0.10.2
-docs := rosdoc2==0.2.1
+docs := rosdoc2==0.2.1 'gymnasium>=1.1'
 colcon := colcon-common-extensions ros-jazzy-ament-package 'setuptools<80' wheel
 jazzy := --editable '.[test,physics]' numpy==1.26.4 scipy==1.11.4
 

@@ -39,6 +39,7 @@ setup(
     extras_require={
         'bag': ['rosbags>=0.11.9'],
         'browser': ['selenium>=4.11'],
+        'gym': ['gymnasium>=1.1'],
         'mcap': ['mcap-ros2-support'],
         'physics': ['mujoco>=4'],
         'plot': [MATPLOTLIB],
