@@ -118,21 +118,37 @@ static PyObject *reset_all(PyObject *module, PyObject *args)
     Py_RETURN_NONE;
 }
 
+enum { COLUMNS = SHAFTS + SHAFTS + MOMENTS + 5 };   /* of what a member reports */
+
+/* Put what a member reports into a row. */
+static void put(const member *one, const report *told, double *row)
+{
+    memcpy(row, told, sizeof *told);
+    row += SHAFTS + SHAFTS + MOMENTS;
+    *row++ = one->now.flow;
+    *row++ = one->now.force[0];
+    *row++ = one->now.force[1];
+    *row++ = one->now.coarse_steps;
+    *row++ = one->failed;
+}
+
 static const char DOC_STEP[] =
-    "step_all(models, members, torques, forces, ticks, of_tick, of_member, first, last)\n--\n\n"
+    "step_all(models, members, torques, forces, out, ticks, of_tick, of_member, first, last)"
+    "\n--\n\n"
     "Advance some members by some ticks, without the interpreter.\n\n"
     "Torques are doubles, N m, those of a tick and a member begin at tick of_tick + member\n"
-    "of_member; forces, N, likewise with 2/3 of that, or None. A member whose tick leads out of\n"
-    "the range of numbers fails: it stays where it was.";
+    "of_member; forces, N, likewise with 2/3 of that, or None. What is reported after each tick,\n"
+    "as report_all has it, goes into out, (ticks, members, 20), or it is None. A member whose\n"
+    "tick leads out of the range of numbers fails: it stays where it was.";
 
 static PyObject *step_all(PyObject *module, PyObject *args)
 {
-    PyObject *models, *members, *torques, *forces;
+    PyObject *models, *members, *torques, *forces, *out;
     Py_ssize_t ticks, of_tick, of_member, first, last;
     buffers b = {0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "OOOOnnnnn", &models, &members, &torques, &forces, &ticks,
-                          &of_tick, &of_member, &first, &last))
+    if (!PyArg_ParseTuple(args, "OOOOOnnnnn", &models, &members, &torques, &forces, &out,
+                          &ticks, &of_tick, &of_member, &first, &last))
         return NULL;
     const Py_ssize_t places = (ticks - 1) * of_tick + (last - 1) * of_member + 1;
     const Py_ssize_t size = (Py_ssize_t)sizeof(double);
@@ -140,18 +156,28 @@ static PyObject *step_all(PyObject *module, PyObject *args)
         && take(&b, MEMBERS, members, PyBUF_WRITABLE, last * (Py_ssize_t)sizeof(member))
         && take(&b, TORQUES, torques, PyBUF_SIMPLE, places * PORTS * size)
         && (forces == Py_None
-            || take(&b, FORCES, forces, PyBUF_SIMPLE, places * CLUTCHES * size))) {
+            || take(&b, FORCES, forces, PyBUF_SIMPLE, places * CLUTCHES * size))
+        && (out == Py_None
+            || take(&b, OUT, out, PyBUF_WRITABLE, ticks * COLUMNS * size
+                    * (b.view[MEMBERS].len / (Py_ssize_t)sizeof(member))))) {
         const model *m = b.view[MODELS].buf;
         member *all = b.view[MEMBERS].buf;
         const double *T = b.view[TORQUES].buf;
         const double *A = b.taken[FORCES] ? b.view[FORCES].buf : NULL;
+        double *rows = b.taken[OUT] ? b.view[OUT].buf : NULL;
+        const Py_ssize_t count = b.view[MEMBERS].len / (Py_ssize_t)sizeof(member);
         Py_BEGIN_ALLOW_THREADS
         for (Py_ssize_t n = first; n < last; n++) {
             patterns *known = known_of(&all[n]);
-            for (Py_ssize_t t = 0; t < ticks && !all[n].failed; t++) {
+            report told = {{0.0}, {0.0}, {0.0}};
+            for (Py_ssize_t t = 0; t < ticks && (rows || !all[n].failed); t++) {
                 const Py_ssize_t place = t * of_tick + n * of_member;
-                all[n].failed = dm_tick(&m[n], &all[n].now, known, T + PORTS * place,
-                                        A ? A + CLUTCHES * place : NULL, NULL, NULL) != 0;
+                if (!all[n].failed)
+                    all[n].failed = dm_tick(&m[n], &all[n].now, known, T + PORTS * place,
+                                            A ? A + CLUTCHES * place : NULL, NULL,
+                                            rows ? &told : NULL) != 0;
+                if (rows)
+                    put(&all[n], &told, &rows[(t * count + n) * COLUMNS]);
             }
         }
         Py_END_ALLOW_THREADS
@@ -169,7 +195,6 @@ static const char DOC_REPORT[] =
 
 static PyObject *report_all(PyObject *module, PyObject *args)
 {
-    enum { COLUMNS = SHAFTS + SHAFTS + MOMENTS + 5 };
     PyObject *models, *members, *out;
     Py_ssize_t first, last;
     buffers b = {0};
@@ -184,17 +209,9 @@ static PyObject *report_all(PyObject *module, PyObject *args)
         double *values = b.view[OUT].buf;
         Py_BEGIN_ALLOW_THREADS
         for (Py_ssize_t n = first; n < last; n++) {
-            const state *now = &all[n].now;
-            double *row = &values[n * COLUMNS];
             report told = {{0.0}, {0.0}, {0.0}};
-            dm_report(&m[n], now, known_of(&all[n]), &told);
-            memcpy(row, &told, sizeof told);
-            row += SHAFTS + SHAFTS + MOMENTS;
-            *row++ = now->flow;
-            *row++ = now->force[0];
-            *row++ = now->force[1];
-            *row++ = now->coarse_steps;
-            *row++ = all[n].failed;
+            dm_report(&m[n], &all[n].now, known_of(&all[n]), &told);
+            put(&all[n], &told, &values[n * COLUMNS]);
         }
         Py_END_ALLOW_THREADS
     }

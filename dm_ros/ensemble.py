@@ -23,7 +23,11 @@ from dm_ros.motion.simulation import Simulation
 
 SMALL = 256        # members whose ticks are not worth a thread
 COLUMNS = 20       # of what is reported of a member
+# of each quantity its first column, and what gives the names of its columns
+PLACES = {'velocity': (0, 'shafts'), 'position': (5, 'shafts'), 'moment': (10, 'moments'),
+          'power_flow': (15, None), 'clutch_force': (16, 'clutches')}
 DEADBAND = 6       # number of the dead band among those of a packed model
+BLOCK = 1 << 24    # bytes of reports that a run holds while it records
 
 
 class Ensemble:
@@ -146,14 +150,19 @@ class Ensemble:
         """
         self.run([torques], None if clutch_forces is None else [clutch_forces])
 
-    def run(self, torques, clutch_forces=None):
+    def run(self, torques, clutch_forces=None, record=()):
         """
         Advance one tick for each row.
 
         :param torques: N m, (ticks, inputs) for all or (ticks, n, inputs).
         :param clutch_forces: N, (ticks, clutches) for all or (ticks, n, clutches).
+        :param record: names of what is to be recorded, such as ``('velocity', 'moment')``.
+        :return: ``{name: array}`` of these, at the end of each tick, (ticks, n, ...).
         :raises ValueError: as ``step``; nothing has moved then.
         """
+        for name in record:
+            if name not in PLACES:
+                raise ValueError(f'record: {name!r} is not one of {", ".join(PLACES)}')
         T = self._run_of('torques', torques, self.inputs)
         A = None
         if self.clutches or clutch_forces is not None:
@@ -165,9 +174,17 @@ class Ensemble:
             shape = np.broadcast_shapes(T.shape[:2], A.shape[:2])
             T, A = (np.ascontiguousarray(np.broadcast_to(rows, (*shape, rows.shape[2])))
                     for rows in (T, A))
-        self._members.step(T, A if self.clutches else None)
+        kept = {name: [] for name in record}
+        at_once = max(1, BLOCK // (8 * COLUMNS * len(self))) if record else max(1, len(T))
+        for first in range(0, max(1, len(T)), at_once):   # the reports need room
+            part = slice(first, first + at_once)
+            told = np.empty((len(T[part]), len(self), COLUMNS)) if record else None
+            self._members.step(T[part], A[part] if self.clutches else None, told)
+            for name in record:
+                kept[name].append(self._columns(name, blanked(told)).copy())
         self._ticks += len(T)
         self._reported = None
+        return {name: np.concatenate(parts) for name, parts in kept.items()}
 
     def _run_of(self, what, values, names, low=-np.inf):
         """Return values over time as (ticks, 1 or n, names)."""
@@ -196,34 +213,38 @@ class Ensemble:
 
     def _report(self):
         if self._reported is None:
-            self._reported = self._members.report()
-            self._reported[self._reported[:, -1] > 0.0, :-2] = np.nan
+            self._reported = blanked(self._members.report())
         return self._reported
+
+    def _columns(self, name, table):
+        """Return what a table of reports has of a quantity."""
+        first, names = PLACES[name]
+        return table[..., first:first + len(getattr(self, names))] if names else table[..., first]
 
     @property
     def velocity(self):
         """Speeds, rad/s, (n, shafts)."""
-        return self._report()[:, :len(self.shafts)]
+        return self._columns('velocity', self._report())
 
     @property
     def position(self):
         """Angles, rad, (n, shafts)."""
-        return self._report()[:, 5:5 + len(self.shafts)]
+        return self._columns('position', self._report())
 
     @property
     def moment(self):
         """Internal moments, N m, (n, moments)."""
-        return self._report()[:, 10:10 + len(self.moments)]
+        return self._columns('moment', self._report())
 
     @property
     def power_flow(self):
         """The power-flow index, (n,)."""
-        return self._report()[:, 15]
+        return self._columns('power_flow', self._report())
 
     @property
     def clutch_force(self):
         """Forces on the clutches, N, (n, clutches)."""
-        return self._report()[:, 16:16 + len(self.clutches)]
+        return self._columns('clutch_force', self._report())
 
     @property
     def coarse_steps(self):
@@ -234,6 +255,12 @@ class Ensemble:
     def failed(self):
         """Whether a tick led out of the range of floating point numbers, (n,)."""
         return self._report()[:, -1] > 0.0
+
+
+def blanked(table):
+    """Return a table of reports in which those of failed members are NaN."""
+    table[table[..., -1] > 0.0, :-2] = np.nan
+    return table
 
 
 class InC:
@@ -292,10 +319,11 @@ class InC:
         self._all(lambda first, last: self._core.reset_all(
             self._models, self._state, velocity, first, last))
 
-    def step(self, torques, forces):
+    def step(self, torques, forces, told):
         ticks, wide, _ = torques.shape
         self._all(lambda first, last: self._core.step_all(
-            self._models, self._state, torques, forces, ticks, wide, int(wide > 1), first, last))
+            self._models, self._state, torques, forces, told, ticks, wide, int(wide > 1), first,
+            last))
 
     def report(self):
         out = np.empty((self._n, COLUMNS))
@@ -322,14 +350,16 @@ class InPython:
         for ticker, speeds in zip(self._tickers, velocity.tolist()):
             ticker.reset(tuple(speeds))
 
-    def step(self, torques, forces):
+    def step(self, torques, forces, told):
         for n, ticker in enumerate(self._tickers):
             i = n if torques.shape[1] > 1 else 0
             commands = ([()] * len(torques) if forces is None
                         else map(tuple, forces[:, i].tolist()))
-            for T, A in zip(map(tuple, torques[:, i].tolist()), commands):
+            for t, (T, A) in enumerate(zip(map(tuple, torques[:, i].tolist()), commands)):
                 if not self._failed[n]:
                     self._tick(n, ticker, T, A)
+                if told is not None:
+                    self._tell(n, told[t, n])
 
     def _tick(self, n, ticker, T, A):
         try:
@@ -338,10 +368,16 @@ class InPython:
             self._failed[n] = True
 
     def report(self):
-        out = np.zeros((len(self._tickers), COLUMNS))
-        for row, ticker, failed in zip(out, self._tickers, self._failed):
-            _, velocity, position, _, moment, flow, force = ticker.report()
-            row[:len(velocity)], row[5:5 + len(position)] = velocity, position
-            row[10:10 + len(moment)], row[15], row[16:16 + len(force)] = moment, flow, force
-            row[-2:] = ticker.coarse_steps, failed
+        out = np.empty((len(self._tickers), COLUMNS))
+        for n, row in enumerate(out):
+            self._tell(n, row)
         return out
+
+    def _tell(self, n, row):
+        """Put what member n reports into a row."""
+        ticker = self._tickers[n]
+        row[:] = 0.0
+        _, velocity, position, _, moment, flow, force = ticker.report()
+        row[:len(velocity)], row[5:5 + len(position)] = velocity, position
+        row[10:10 + len(moment)], row[15], row[16:16 + len(force)] = moment, flow, force
+        row[-2:] = ticker.coarse_steps, self._failed[n]

@@ -65,6 +65,33 @@ def test_each_member_moves_like_a_simulation_of_its_own(variant, clutched, loss_
     assert ensemble.velocity[:, 1:3] == pytest.approx(start)
 
 
+@pytest.mark.parametrize('variant, clutched', [('symmetric_ode', False), ('symmetric_ode', True),
+                                               ('lsd_ode', False)])
+def test_what_is_recorded_is_what_every_tick_reports(variant, clutched, language, monkeypatch):
+    monkeypatch.setattr('dm_ros.ensemble.BLOCK', 8 * 20 * 5 * 4)   # of which 4 ticks make one
+    sets, names = sets_of(variant, 5, clutched), ('velocity', 'position', 'moment', 'power_flow',
+                                                  'clutch_force')
+    T = np.random.default_rng(2).normal(0, 100, (TICKS, 5, 3))
+    T[9:, 3] = 1e308
+    recorded = Ensemble(variant, sets).run(T, record=names)
+    ensemble = Ensemble(variant, sets)
+    for n in range(TICKS):
+        ensemble.step(T[n])
+        for name in names:
+            now = getattr(ensemble, name)
+            assert recorded[name][n].tobytes() == now.tobytes(), (name, n)
+    assert recorded['velocity'].shape == (TICKS, 5, len(ensemble.shafts))
+    assert ensemble.failed.tolist() == [False, False, False, True, False]
+
+
+def test_what_cannot_be_recorded_is_refused_by_name():
+    ensemble = Ensemble('lsd_ode', [{}])
+    with pytest.raises(ValueError, match="record: 'speed' is not one of velocity, position"):
+        ensemble.run(np.zeros((2, 3)), record=('speed',))
+    assert ensemble.ticks == 0
+    assert ensemble.run(np.zeros((0, 3)), record=('moment',))['moment'].shape == (0, 1, 4)
+
+
 def test_one_torque_is_for_all_and_threads_change_nothing(language):
     masses = {'lsd.inertia.rear': np.linspace(0.005, 0.5, 600)}
     runs = []
