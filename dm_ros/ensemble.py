@@ -17,6 +17,7 @@ import numpy as np
 from dm_ros import core
 from dm_ros.mechanism.sets import array_of_sets, named, table_of
 from dm_ros.mechanism.variants import equipped, variant_named
+from dm_ros.motion.checks import checked
 from dm_ros.motion.models import no_solution, PASSIVE
 from dm_ros.motion.packing import packed
 from dm_ros.motion.simulation import Simulation
@@ -62,6 +63,9 @@ class Ensemble:
         self._check_clutches(kind, first.has_clutches)
         speeds = self._checked('initial_velocity', initial_velocity, one.outputs, -1e6, 1e6)
         self._velocity = np.ascontiguousarray(np.broadcast_to(speeds, (len(self), 2)))
+        if threads is not None:
+            threads = int(checked('threads', threads, lambda v: v >= 1 and v == int(v),
+                                  'a positive integer'))
         self._members = (InC if core.Ticker else InPython)(self, threads)
         self.reset()
 
@@ -214,6 +218,7 @@ class Ensemble:
     def _report(self):
         if self._reported is None:
             self._reported = blanked(self._members.report())
+            self._reported.flags.writeable = False
         return self._reported
 
     def _columns(self, name, table):

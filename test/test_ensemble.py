@@ -60,6 +60,8 @@ def test_each_member_moves_like_a_simulation_of_its_own(variant, clutched, loss_
         assert getattr(ensemble, name).tobytes() == expected.tobytes(), name
     assert ensemble.coarse_steps.tolist() == [s.coarse_steps for s in singles]
     assert ensemble.time == singles[0].time and not ensemble.failed.any()
+    with pytest.raises(ValueError, match='read-only'):
+        ensemble.velocity[:] = 7.0
     ensemble.reset()
     assert ensemble.ticks == 0 and not ensemble.position.any()
     assert ensemble.velocity[:, 1:3] == pytest.approx(start)
@@ -164,7 +166,8 @@ def test_bad_inputs_are_named_and_nothing_moves(torques, forces, words, language
 
 def test_what_is_for_all_is_checked_as_by_a_simulation(language):
     for more, words in (({'dt': 0.0}, 'dt: 0.0'), ({'substeps': 0}, 'substeps: 0'),
-                        ({'loss_law': 'none'}, 'loss_law'),
+                        ({'loss_law': 'none'}, 'loss_law'), ({'threads': 0}, 'threads: 0'),
+                        ({'threads': 2.5}, 'threads: 2.5'), ({'threads': 'a'}, "threads: 'a'"),
                         ({'initial_velocity': (1e7, 0.0)}, 'initial_velocity: front: 10000000.0'),
                         ({'variant': 'x'}, "variant: 'x'")):
         with pytest.raises(ValueError, match=words):

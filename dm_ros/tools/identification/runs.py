@@ -10,6 +10,8 @@ from dm_ros.mechanism.variants import variant_named
 from dm_ros.settings import NodeParameters
 from dm_ros.tools.progress import progress
 
+BLOCK = 500   # ticks that are recorded at once
+
 
 class Runs:
     """
@@ -68,15 +70,18 @@ class Runs:
     def _run(self, ensemble, what):
         """Return the speeds of one ensemble, (sets, measured shafts, times)."""
         torques, forces = np.split(self._inputs, [len(self._mechanism.ports)], axis=1)
-        kept, begin = [], 0
-        with progress(total=len(torques)) as bar:
+        kept, last = [], self._kept[-1]
+        if self._kept[0] == 0:
+            kept.append(ensemble.velocity[None, :, self._columns])
+        with progress(total=last) as bar:
             bar.set_description(what, refresh=False)
-            for end in self._kept.tolist():
-                if end > begin:
-                    ensemble.run(torques[begin:end], forces[begin:end] if forces.size else None)
+            for begin in range(0, last, BLOCK):
+                end = min(begin + BLOCK, last)
+                told = ensemble.run(
+                    torques[begin:end], forces[begin:end] if forces.size else None, ['velocity'])
+                here = self._kept[(self._kept > begin) & (self._kept <= end)] - begin - 1
+                kept.append(told['velocity'][here][..., self._columns])
                 bar.update(end - begin)
-                kept.append(ensemble.velocity[:, self._columns])
-                begin = end
-        kept = np.array(kept)
+        kept = np.concatenate(kept)
         at_times = kept[self._before] * (1 - self._share) + kept[self._after] * self._share
         return at_times.transpose(1, 2, 0)
