@@ -21,6 +21,11 @@ typedef struct {
 
 enum { CLUTCHED = 16 };   /* parameters of clutches, the last of both tables */
 
+static void read_clutches(table *t, const double *p)
+{
+    memcpy((char *)t + offsetof(table, n_F), p, CLUTCHED * sizeof *p);
+}
+
 static table read(int is_symmetric, const double *p)
 {
     table t;
@@ -28,7 +33,7 @@ static table read(int is_symmetric, const double *p)
         const size_t before = offsetof(table, R_2) / sizeof *p;
         memcpy(&t, p, before * sizeof *p);
         t.R_2 = t.R_1;   /* there is one radius */
-        memcpy(t.n_F, p + before, CLUTCHED * sizeof *p);
+        read_clutches(&t, p + before);
         return t;
     }
     t.R_1 = p[0], t.R_2 = p[1], t.g_2s = p[2], t.n_s = p[3];
@@ -37,7 +42,7 @@ static table read(int is_symmetric, const double *p)
     t.eta_0B = p[12], t.eta_1G = p[13], t.eta_2G = p[14], t.sign_speed = p[15], t.alpha = p[16];
     t.g_F = t.I_3 = t.l_3 = 0.0;
     t.eta_3B = t.eta_FG = 1.0;
-    memcpy(t.n_F, p + 17, CLUTCHED * sizeof *p);
+    read_clutches(&t, p + 17);
     return t;
 }
 
