@@ -27,6 +27,7 @@ from dm_ros.mechanism.symmetric import SymmetricOde
 from dm_ros.motion import adaptive, held_torque
 from dm_ros.motion.adaptive import PAPER, PASSIVE, rosenbrock_part
 from dm_ros.motion.exponentials import apply_phi_2, complex_phi_2, held_propagator, phi_2
+from dm_ros.motion.quadrature import RULES, rule_for
 
 # The exact step
 
@@ -123,6 +124,10 @@ def test_phi_2_of_a_number_is_its_series_or_definition(z):
         assert value == pytest.approx(sum(terms), rel=2e-12)
     else:
         assert phi_2(z) == pytest.approx((np.exp(z) - 1 - z) / z**2, rel=1e-14)
+
+
+def test_a_path_that_is_stiff_beyond_all_numbers_has_the_finest_rule():
+    assert rule_for((-1e308, 0.0, 0.0, -1e308), 10.0) is RULES[-1]
 
 
 # The adaptive step: one part

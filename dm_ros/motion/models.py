@@ -102,10 +102,13 @@ class SymmetricModel(Model):
         for direction, response in responses_of(formulation, parameters).items():
             A, B, _, P, Q, _ = symmetric.in_slip(response)
             rows = direction * np.hstack([P, Q])   # M as it is reported
+            try:
+                second = second_moment_of_the_way(A.ravel().tolist(), h)
+            except ArithmeticError:
+                raise no_solution(parameters) from None
             self.exact[direction] = Exact(
                 held_torque_step(A, B, h), symmetric.Moments(*rows.ravel().tolist()),
-                losses.symmetric_losses(parameters, direction).of_reported(direction),
-                second_moment_of_the_way(A.ravel().tolist(), h))
+                losses.symmetric_losses(parameters, direction).of_reported(direction), second)
 
     def step(self, x, S, T, direction):
         """Advance by h; see the module for what is returned."""

@@ -43,10 +43,10 @@ def rule_for(J, h, far=True):
     """
     stiff, most = h * (abs(J[0]) + abs(J[3])), FINE if far else STIFF
     pieces = 1
-    while stiff > most:
+    while stiff > most and pieces < len(RULES) - 1:
         stiff /= 2.0
         pieces += 1
-    return RULES[min(pieces, len(RULES) - 1)]
+    return RULES[pieces]
 
 
 def second_moment_of_the_way(A, h):
