@@ -19,7 +19,7 @@ from dm_ros.mechanism.self_locking import kinematics, slip_coordinates
 from dm_ros.mechanism.variants import CATALOGUE
 from dm_ros.motion import models
 from dm_ros.motion.held_torque import held_torque_step_by_floats
-from dm_ros.motion.models import LOSS_LAWS, PASSIVE
+from dm_ros.motion.models import LOSS_LAWS, PAPER, PASSIVE
 from dm_ros.motion.packing import packed
 
 CASES = range(200)
@@ -144,3 +144,52 @@ def test_the_tables_have_as_many_numbers_as_c_reads():
         setup = struct.pack('7d', kind is SymmetricParameters, 1, 0, 0, 1, 1e-3, 0)
         with pytest.raises(ValueError, match='bytes'):
             module.make_all(setup, numbers, bytearray(module.MODEL), 0, 1)
+
+
+def anywhere(rng, kind):
+    """Return values of all over the ranges of a table, small ones too, and some at their ends."""
+    values = {}
+    for symbol, (_, row) in kind.rows().items():
+        if rng.random() < 0.6:
+            continue
+        if row.kind is int:
+            values[symbol] = int(rng.integers(row.low, min(row.high, 12) + 1))
+        elif rng.random() < 0.2:
+            values[symbol] = row.high if row.above_low else float(rng.choice([row.low, row.high]))
+        else:
+            sign = -1.0 if row.low < 0.0 and rng.random() < 0.5 else 1.0
+            least = max(row.low, 1e-100)
+            values[symbol] = float(sign * min(least * (row.high / least) ** rng.random(),
+                                              row.high))
+    return values
+
+
+@built
+def test_c_makes_and_refuses_what_python_does_all_over_the_ranges():
+    rng, refused, count = np.random.default_rng(0), 0, 600
+    for n in range(count):
+        variant = str(rng.choice(list(CATALOGUE)))
+        kind = CATALOGUE[variant].mechanism.parameters
+        values = anywhere(rng, kind)
+        surfaces = {symbol: values.get(symbol, 0) for symbol in ('n_F1', 'n_F2')}
+        unchecked = Simulation(variant, parameters=kind(mu_1=0.0, mu_2=0.0, **surfaces))
+        for symbol, value in (vars(kind()) | surfaces | values).items():
+            object.__setattr__(unchecked.parameters, symbol, value)
+        is_made, model = made(unchecked)
+        try:
+            ticker = Simulation(variant, parameters=kind(**(surfaces | values)))._ticker
+        except ValueError:
+            refused += 1
+            assert not is_made, (n, variant, values)
+            continue
+        assert is_made and model == packed(ticker.model, ticker.run), (n, variant, values)
+    assert 0 < refused < count
+
+
+@built
+def test_a_step_so_long_that_it_has_no_numbers_is_refused_by_both():
+    p = SymmetricParameters()
+    with pytest.raises(ValueError, match='no finite solution'):
+        Simulation('symmetric_ode', 1e200, p, loss_law=PAPER)
+    setup = struct.pack('7d', 1, 0, 0, 0, 1, 1e200, 0)
+    assert module.make_all(setup, np.array(astuple(p), float), bytearray(module.MODEL), 0, 1) == 0
