@@ -87,6 +87,8 @@ int dm_root(const context *f, double start, double *found)
         *found = start;
         return 1;
     }
+    if (isnan(guess))   /* nor will any other be a number */
+        return 0;
     for (int n = 0; n < DOUBLINGS; n++) {
         if (f->value(f, start + guess) * guess >= 0.0)
             return bracketed_root(f, start, start + guess, found);

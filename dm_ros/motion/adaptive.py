@@ -87,6 +87,8 @@ def root(residual, start, guess):
     """
     if guess == 0.0:
         return start
+    if guess != guess:   # no number, nor will any other be
+        return None
     for _ in range(60):
         if residual(start + guess) * guess >= 0.0:
             return bracketed_root(residual, start, start + guess)
