@@ -3,17 +3,21 @@
 
 """What the tests of the physics share: random mechanisms and references from first principles."""
 
+from contextlib import contextmanager
 import dataclasses
 import math
+from unittest import mock
 
 import numpy as np
 
 from dm_ros import SelfLockingParameters, SymmetricParameters
-from dm_ros.mechanism import clutched, passive
+from dm_ros.mechanism import clutched, elimination, passive, symmetric
+from dm_ros.mechanism.clutched import LinearResponse
 from dm_ros.mechanism.self_locking import SelfLockingOde
 from dm_ros.mechanism.variants import SYMMETRIC, variant_named
-from dm_ros.motion import adaptive
+from dm_ros.motion import adaptive, models
 from dm_ros.motion.adaptive import PAPER, PASSIVE
+from dm_ros.motion.held_torque import held_torque_step_by_floats
 
 BOTH = (1, -1)   # directions of power flow
 
@@ -21,6 +25,26 @@ BOTH = (1, -1)   # directions of power flow
 def is_symmetric(variant):
     """Return whether a variant is one of the symmetric differential."""
     return variant_named(variant).mechanism is SYMMETRIC
+
+
+def eliminated(p, direction):
+    """Return the ``LinearResponse`` of ``elimination``."""
+    clutches = p.has_clutches
+    e_0, e_s, M_1, M_2, M_F = map(np.array, elimination.rows(
+        p, passive.coefficients(p, clutches), direction))
+    e, M = np.array([e_0, e_s]), np.array([M_F, M_1, M_2] if hasattr(p, 'g_F') else [M_1, M_2])
+    return LinearResponse(e[:, :2], e[:, 2:5], -e[:, 5:], M[:, :2], M[:, 2:5], -M[:, 5:])
+
+
+@contextmanager
+def by_elimination():
+    """Let simulations under the paper's law have the coefficients that C makes."""
+    with mock.patch.multiple(
+            models, responses_of=lambda _, p: {d: eliminated(p, d) for d in BOTH},
+            held_torque_step=lambda A, B, h: held_torque_step_by_floats(
+                A.ravel().tolist(), B.tolist(), h)), \
+            mock.patch.object(symmetric, 'in_slip', lambda response: response):
+        yield
 
 
 class Flow:

@@ -5,35 +5,24 @@
 
 from dataclasses import astuple, replace
 import struct
-from unittest import mock
 
+from mechanisms import by_elimination, eliminated
 import numpy as np
 from properties import random_case
 import pytest
 
 from dm_ros import core, SelfLockingParameters, Simulation, SymmetricParameters
-from dm_ros.mechanism import elimination, passive, symmetric
+from dm_ros.mechanism import symmetric
 from dm_ros.mechanism.clutched import LinearResponse
 from dm_ros.mechanism.kinetic import kinetic_form
 from dm_ros.mechanism.self_locking import kinematics, slip_coordinates
 from dm_ros.mechanism.variants import CATALOGUE
-from dm_ros.motion import models
-from dm_ros.motion.held_torque import held_torque_step_by_floats
 from dm_ros.motion.models import LOSS_LAWS, PAPER, PASSIVE
 from dm_ros.motion.packing import packed
 
 CASES = range(200)
 module = core._chosen('')
 built = pytest.mark.skipif(module is None, reason='the core in C is not built')
-
-
-def eliminated(p, direction):
-    """Return the ``LinearResponse`` of ``elimination``."""
-    clutches = p.has_clutches
-    e_0, e_s, M_1, M_2, M_F = map(np.array, elimination.rows(
-        p, passive.coefficients(p, clutches), direction))
-    e, M = np.array([e_0, e_s]), np.array([M_F, M_1, M_2] if hasattr(p, 'g_F') else [M_1, M_2])
-    return LinearResponse(e[:, :2], e[:, 2:5], -e[:, 5:], M[:, :2], M[:, 2:5], -M[:, 5:])
 
 
 def responses(p, direction):
@@ -107,11 +96,7 @@ def made(simulation):
 @built
 @pytest.mark.parametrize('loss_law', LOSS_LAWS)
 def test_c_makes_the_model_that_python_makes_to_the_last_bit(loss_law):
-    by_floats = mock.patch.multiple(
-        models, responses_of=lambda _, p: {d: eliminated(p, d) for d in (1, -1)},
-        held_torque_step=lambda A, B, h: held_torque_step_by_floats(
-            A.ravel().tolist(), B.tolist(), h))
-    with by_floats, mock.patch.object(symmetric, 'in_slip', lambda response: response):
+    with by_elimination():
         for n in CASES:
             case = random_case(n, clutched=n % 4 == 0)
             simulation = Simulation(case.variant, **{**case.arguments, 'loss_law': loss_law,
