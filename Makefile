@@ -125,6 +125,7 @@ colcon: .venv/colcon  ## build the package with colcon, check what it installs, 
 	test -f install/dm_ros/share/dm_ros/config/layouts/plotjuggler_lsd.xml
 	test -f install/dm_ros/share/dm_ros/launch/differential.launch.py
 	test -f install/dm_ros/lib/python*/site-packages/dm_ros/watch/web/uplot/uPlot.iife.min.js
+	test -f install/dm_ros/lib/python*/site-packages/dm_ros/sources/fmi/fmu.c
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST timeout --preserve-status -s INT 5 \
 	  install/dm_ros/lib/dm_ros/differential --ros-args -p variant:=lsd_ode -p rate:=500.0 \
 	  --params-file install/dm_ros/share/dm_ros/config/lsd.yaml

@@ -27,7 +27,7 @@ setup(
         (f'share/{NAME}/config/ros2_control', glob('config/ros2_control/*')),
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
     ],
-    package_data={NAME: ['ros/*.xml', 'watch/web/*', 'watch/web/uplot/*']},
+    package_data={NAME: ['ros/*.xml', 'sources/**/*', 'watch/web/*', 'watch/web/uplot/*']},
     ext_modules=[Extension(   # never required: without a compiler Python does it all
         f'{NAME}._core', sorted(glob('core/*.c')), depends=glob('core/*.h'), optional=True,
         py_limited_api=True, extra_compile_args=[   # equal bits: no fused multiply-add
@@ -39,6 +39,7 @@ setup(
     extras_require={
         'bag': ['rosbags>=0.11.9'],
         'browser': ['selenium>=4.11'],
+        'fmu': ['fmpy>=0.3.32', 'libcosimpy', 'ziglang'],
         'gym': ['gymnasium>=1.1'],
         'mcap': ['mcap-ros2-support'],
         'physics': ['mujoco>=4'],
@@ -53,6 +54,7 @@ setup(
             'compare_variants = dm_ros.commands:compare_variants',
             'demo = dm_ros.commands:demo',
             'differential = dm_ros.commands:differential',
+            'export_fmu = dm_ros.commands:export_fmu',
             'identify = dm_ros.commands:identify',
             'play_torques = dm_ros.commands:play_torques',
             'simulate = dm_ros.commands:simulate',

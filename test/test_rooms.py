@@ -16,7 +16,8 @@ import pytest
 ROOT = Path(__file__).parents[1] / 'dm_ros'
 FLOORS = [   # from the ground up; a file of the package itself is a room of its own
     {'ending', 'core'}, {'mechanism'}, {'motion'}, {'settings', 'ensemble'}, {'plant', 'files'},
-    {'watch'}, {'ros'}, {'tools', 'testing'}, {'__init__', 'bias', 'commands', 'energy', 'gym'}]
+    {'fmu', 'watch'}, {'ros'}, {'tools', 'testing'},
+    {'__init__', 'bias', 'commands', 'energy', 'gym'}]
 KNOW_ROS = {'ros', 'tools', 'testing'}
 NEED_MORE = {'gym'}   # an extra, to be imported
 PRIVATES = ROOT / 'ros' / 'privates.py'
@@ -89,13 +90,14 @@ def test_no_script_of_the_page_does_either():
                 if (lines := len(path.read_text().splitlines())) > 400}
 
 
-def test_all_files_of_the_page_are_installed():
+def test_all_files_of_the_page_and_of_fmus_are_installed():
     setup = (ROOT.parent / 'setup.py').read_text()
     patterns = re.search(r'package_data=\{NAME: \[(.*)\]\}', setup).group(1)
     installed = {path for pattern in re.findall(r"'(.+?)'", patterns)
                  for path in ROOT.glob(pattern)}
     web = {path for path in (ROOT / 'watch' / 'web').rglob('*') if path.is_file()}
-    assert web <= installed
+    core = {path for path in (ROOT / 'sources').glob('**/*') if path.is_file()}
+    assert len(core) > 20 and web | core <= installed
 
 
 def test_only_the_rooms_of_ros_import_it():
