@@ -27,7 +27,7 @@ from dm_ros.mechanism.symmetric import SymmetricOde
 from dm_ros.motion import adaptive, held_torque
 from dm_ros.motion.adaptive import PAPER, PASSIVE, rosenbrock_part
 from dm_ros.motion.exponentials import apply_phi_2, complex_phi_2, held_propagator, phi_2
-from dm_ros.motion.quadrature import RULES, rule_for
+from dm_ros.motion.quadrature import rule_for, RULES
 
 # The exact step
 
