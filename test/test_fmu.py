@@ -493,6 +493,18 @@ def test_many_instances_in_many_threads_do_not_disturb_each_other(version):
         assert all(pool.map(run, range(32)))
 
 
+def test_importers_of_fmi_2_may_take_integers_for_reals():
+    """As fmi_adapter does, for which all variables are reals."""
+    instance = Instance(exported('lsd_ode'))
+    count, flow = (instance.variables[name].valueReference
+                   for name in ('lsd.satellite_count', 'power_flow'))
+    instance.fmu.setReal([count], [5.0])
+    assert instance.get('lsd.satellite_count') == [5]
+    assert list(instance.fmu.getReal([count, flow])) == [5.0, 1.0]
+    refused(instance, lambda: instance.fmu.setReal([count], [2.5]),
+            'lsd.satellite_count: 2.5 is not allowed, it must be an integer in [1, 64]')
+
+
 @pytest.mark.parametrize('version', VERSIONS)
 def test_calls_out_of_order_are_errors(version):
     instance = Instance(exported('lsd_dae', version), version)
