@@ -41,7 +41,7 @@ static int largest_share(double high, double low, double h, double *share)
     return 1;
 }
 
-static int reach_of_slopes(const double A[2][2], double h, double *reach)
+static int reach_of_slopes(double A[2][2], double h, double *reach)
 {
     const double mean = (A[0][0] + A[1][1]) / 2, half = (A[0][0] - A[1][1]) / 2;
     const double square = half * half + A[0][1] * A[1][0];

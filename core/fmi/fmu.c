@@ -135,16 +135,24 @@ void fmu_reset(fmu *f)
     f->is_changed = 0;
 }
 
+static int is_prepared = 0;
+
+#ifdef __GNUC__
+__attribute__((constructor))   /* before any thread may ask for an instance */
+#endif
+static void prepare(void)
+{
+    if (!is_prepared)
+        dm_prepare_rules();
+    is_prepared = 1;
+}
+
 fmu *fmu_new(void (*complain)(void *, const char *), void *to)
 {
-    static int is_prepared = 0;
     fmu *f = calloc(1, sizeof *f);
     if (!f)
         return NULL;
-    if (!is_prepared) {
-        dm_prepare_rules();
-        is_prepared = 1;
-    }
+    prepare();
     f->complain = complain;
     f->to = to;
     fmu_reset(f);
