@@ -3,9 +3,12 @@
 
 """A differential with half-shafts on some of its ports: see ``coupled`` for its equations."""
 
+from operator import add
+
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.motion import adaptive, coupled
 from dm_ros.motion.coupled import Equations, HalfShaft
+from dm_ros.motion.matrices import Exponentials
 from dm_ros.motion.models import (
     ClutchedModel,
     ClutchedSymmetricModel,
@@ -51,7 +54,7 @@ class CoupledModel:
             self._law = adaptive.PASSIVE
         self.lagged = self.inner.lagged
         self.half_shafts = half_shafts_of(mechanism, parameters, ports)
-        self._exponentials = coupled.Exponentials()
+        self._exponentials = Exponentials()
         self.independent = self.inner.independent
         self.friction, self.remembered = self.inner.friction, self.inner.remembered
 
@@ -70,7 +73,10 @@ class CoupledModel:
 
     def mean_torques(self, inputs, steps):
         """Return the mean torque on each port over some steps, N m."""
-        a_w, a_s, *twisted = map(sum, zip(*(integral for _, _, _, integral, *_ in steps)))
+        (_, _, _, total, *_), *others = steps
+        for _, _, _, integral, *_ in others:
+            total = map(add, total, integral)
+        a_w, a_s, *twisted = total
         time = len(steps) * self.h
         T = list(inputs)
         for shaft, turned in zip(self.half_shafts, twisted):
@@ -97,7 +103,7 @@ class CoupledModel:
         start, end, turned = ([0.0] * len(twists) for _ in range(3))
         for n, twist, total in zip(active, equations.twists(z), equations.twists(integral)):
             start[n], end[n], turned[n] = twists[n], twist, total
-        (w_end, s_end), (a_w, a_s) = z[:2].tolist(), integral[:2].tolist()
+        (w_end, s_end), (a_w, a_s) = z[:2], integral[:2]
         return ((w, s, *start), flow, (w_end, s_end, *end), (a_w, a_s, *turned), at.point, coarse,
                 (equations, parts))
 
