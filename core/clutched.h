@@ -39,6 +39,15 @@ extern const law dm_clutched, dm_clutched_symmetric;
 /* Put what is held in a step, under torques and friction, into u. */
 void dm_clutched_held(const clutched_coefficients *, const double *T, const double *S, double *u);
 
+/* Products of a_w, which is w, and others: at an instant, or their integrals over a part. */
+typedef struct {
+    double a_w, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, M_1_w, M_1_s, M_2_w, M_2_s;
+} products;
+
+/* Put what the elements lose, of which there are products, into lost: W, or J. */
+void dm_clutched_lost(const step *job, const products *, double *lost);
+void dm_clutched_symmetric_lost(const step *job, const products *, double *lost);
+
 void dm_clutched_book(step *job, const part *path, double *lost, double *taken);
 void dm_clutched_symmetric_book(step *job, const part *path, double *lost, double *taken);
 

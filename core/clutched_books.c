@@ -10,11 +10,6 @@
 
 static const double CALM = 4e-6;
 
-/* The integrals of products over a part, and a_w, that of w. */
-typedef struct {
-    double a_w, X_ww, X_ws, X_ss, F_1_w, F_1_s, F_2_w, F_2_s, M_1_w, M_1_s, M_2_w, M_2_s;
-} products;
-
 static products book(step *job, const part *path, double *taken)
 {
     const clutched_coefficients *k = job->coefficients;
@@ -120,10 +115,10 @@ static products book(step *job, const part *path, double *taken)
         m_2 * a_s + k->P_2w * X_ws + k->P_2s * X_ss - k->W_21 * F_1_s - k->W_22 * F_2_s};
 }
 
-void dm_clutched_book(step *job, const part *path, double *lost, double *taken)
+void dm_clutched_lost(const step *job, const products *of, double *lost)
 {
     const self_locking_losses *k = job->losses;
-    const products x = book(job, path, taken);
+    const products x = *of;
     const double T_0_w = job->T[0] * x.a_w;
     lost[0] = k->drag_w * x.X_ww + k->drag_s * x.X_ss;
     lost[1] = k->mesh_1 * (x.M_1_w + k->k_1 * x.M_1_s);
@@ -134,10 +129,10 @@ void dm_clutched_book(step *job, const part *path, double *lost, double *taken)
     lost[5] = -k->k_2 * x.F_2_s;
 }
 
-void dm_clutched_symmetric_book(step *job, const part *path, double *lost, double *taken)
+void dm_clutched_symmetric_lost(const step *job, const products *of, double *lost)
 {
     const symmetric_losses *k = job->losses;
-    const products x = book(job, path, taken);
+    const products x = *of;
     const double *T = job->T;
     const double M_F_w = ((k->Q_0 * T[0] + k->Q_1 * T[1] + k->Q_2 * T[2]) * x.a_w
                           + k->P_w * x.X_ww + k->P_s * x.X_ws
@@ -153,4 +148,16 @@ void dm_clutched_symmetric_book(step *job, const part *path, double *lost, doubl
         - k->carrier_L * (x.F_1_w + x.F_2_w);
     lost[6] = x.F_1_s / 2;
     lost[7] = -x.F_2_s / 2;
+}
+
+void dm_clutched_book(step *job, const part *path, double *lost, double *taken)
+{
+    const products x = book(job, path, taken);
+    dm_clutched_lost(job, &x, lost);
+}
+
+void dm_clutched_symmetric_book(step *job, const part *path, double *lost, double *taken)
+{
+    const products x = book(job, path, taken);
+    dm_clutched_symmetric_lost(job, &x, lost);
 }

@@ -108,6 +108,9 @@ static inline double quotient(step *job, double a, double b)
 /* Put a root of a function that grows on the whole into found; return 0 where none is in reach. */
 int dm_root(const context *f, double start, double *found);
 
+/* The last resort of the passive law, which makes no energy. */
+int dm_implicit_euler(step *job, pair y, matrix J, double h, pair *end, pair *integral);
+
 /* Advance from y; return 0, or -1 where no speed in reach fits or a number divided by zero. */
 int dm_advance(step *job, pair y);
 

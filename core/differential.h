@@ -33,7 +33,7 @@ typedef struct {
     double phi[CLUTCHES], preload[CLUTCHES];   /* full friction of the clutches, see clutched.py */
     double f[CLUTCHES], radius[CLUTCHES], coast[CLUTCHES];
     double limit[CLUTCHES], rise[CLUTCHES];    /* of their actuators */
-    union {
+    union laws {
         coefficients passive;
         struct {                               /* direct flow, reverse flow */
             clutched_coefficients k[2];

@@ -60,7 +60,8 @@ PyMODINIT_FUNC PyInit__core(void)
 {
     dm_prepare_rules();
     PyObject *module = PyModule_Create(&definition);
-    if (module && (dm_add_ticker(module) || dm_add_ensemble(module))) {
+    if (module && (dm_add_ticker(module) || dm_add_ensemble(module)
+                   || dm_add_coupled_step(module))) {
         Py_DECREF(module);
         return NULL;
     }

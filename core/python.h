@@ -22,5 +22,6 @@ int dm_copied(const char *what, const char *bytes, Py_ssize_t size, void *into, 
 /* Add the type Ticker, and the functions for many; return 0, or -1 with an error. */
 int dm_add_ticker(PyObject *module);
 int dm_add_ensemble(PyObject *module);
+int dm_add_coupled_step(PyObject *module);
 
 #endif

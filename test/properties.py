@@ -449,16 +449,42 @@ def endure(variant, kind, settle, periods, loss_law=PASSIVE):
 # In C and in Python
 
 
-class Twins:
-    """Random cases by C and by Python: equal to the last bit."""
+def half_shafts(rng, case, arguments):
+    """
+    Return ``ports`` of one to three half-shafts for a case, and its load with outside speeds.
 
-    def __init__(self, loss_law, clutched=False):
-        self.loss_law, self.clutched = loss_law, clutched
+    These stay near the speeds at the start or jump anywhere, and now and then nothing holds one.
+    """
+    simulation = Simulation(case.variant, **arguments)
+    chosen = rng.permutation(simulation.inputs)[:int(rng.integers(1, 4))].tolist()
+    ports = {name: (power_of_ten(rng, 2, 6), or_zero(rng, power_of_ten(rng, 0, 4)))
+             for name in chosen}
+    start = dict(zip(simulation.shafts, simulation.snapshot().velocity))
+    near, free = power_of_ten(rng, -3, 3), float(rng.choice([0.0, 0.3]))
+    load = [list(torques) for torques in case.load]
+    for inputs in load:
+        for n, name in enumerate(simulation.inputs):
+            if name in ports:
+                speed = float(np.clip(start[name] + rng.normal(0.0, near), -1e6, 1e6))
+                inputs[n] = None if rng.random() < free else speed
+    return ports, load
+
+
+class Twins:
+    """
+    Random cases by C and by Python: equal to the last bit.
+
+    :param ported: whether some ports take a speed, by half-shafts.
+    """
+
+    def __init__(self, loss_law, clutched=False, ported=False):
+        self.loss_law, self.clutched, self.ported = loss_law, clutched, ported
         self.cases = self.ticks = self.coarse_steps = self.refused = 0
 
     def __str__(self):
         which = 'symmetric with clutches' if self.clutched else 'all variants'
-        return (f'{self.loss_law}, {which}: {self.cases} cases, {self.ticks} ticks, '
+        ports = ' on half-shafts' if self.ported else ''
+        return (f'{self.loss_law}, {which}{ports}: {self.cases} cases, {self.ticks} ticks, '
                 f'{self.coarse_steps} coarse '
                 f'steps, {self.refused} ticks refused, equal bits')
 
@@ -468,10 +494,15 @@ class Twins:
         p = dataclasses.replace(case.arguments['parameters'], sign_speed=power_of_ten(rng, -3, 2))
         arguments = {**case.arguments, 'parameters': p, 'loss_law': self.loss_law}
         forces = rng.uniform(0.0, 1e4, (len(case.load), 2)) * rng.integers(2)
+        load = case.load
+        if self.ported:
+            arguments['ports'], load = half_shafts(np.random.default_rng([7, n]), case, arguments)
         ways = []
-        for ticker in (core._chosen('').Ticker, None):
-            with mock.patch.object(core, 'Ticker', ticker):
-                ways.append(self._way(case.variant, arguments, case.load, forces.tolist()))
+        in_c = core._chosen('')
+        for ticker, coupled_step in ((in_c.Ticker, in_c.coupled_step), (None, None)):
+            with (mock.patch.object(core, 'Ticker', ticker),
+                  mock.patch.object(core, 'coupled_step', coupled_step)):
+                ways.append(self._way(case.variant, arguments, load, forces.tolist()))
         assert ways[0] == ways[1], f'case {n}: {case}'
         self.cases += 1
 
@@ -491,8 +522,8 @@ class Twins:
             numbers = np.hstack([*snapshot, audit.coarse_steps, *snapshot.energy.entries])
             found.append(numbers.tobytes())
         total = audit.total.entries, audit.stored_energy, audit.stored_by_changes, audit.worst
-        found.append(np.hstack([*audit.state, *total]).tobytes())
-        found.append(str(audit.returned))
+        found.append(np.hstack(total).tobytes())
+        found.append(f'{audit.state} {audit.returned}')
         self.ticks += audit.ticks
         self.coarse_steps += audit.coarse_steps
         return found

@@ -15,7 +15,7 @@ import pytest
 
 from dm_ros import core, Simulation
 from dm_ros.motion.models import LOSS_LAWS
-from dm_ros.motion.packing import packed
+from dm_ros.motion.packing import packed, packed_coupling
 
 ROOT = Path(__file__).parents[1]
 built = pytest.mark.skipif(core._chosen('') is None, reason='the core in C is not built')
@@ -29,14 +29,33 @@ def python(*arguments, **environment):
 
 
 @built
+@pytest.mark.parametrize('ported', [False, True])
 @pytest.mark.parametrize('clutched', [False, True])
 @pytest.mark.parametrize('loss_law', LOSS_LAWS)
-def test_c_and_python_give_the_same_bits_on_random_mechanisms(loss_law, clutched):
-    twins = Twins(loss_law, clutched)
+def test_c_and_python_give_the_same_bits_on_random_mechanisms(loss_law, clutched, ported):
+    twins = Twins(loss_law, clutched, ported)
     for n in range(150):
         twins.run(n)
     print(twins)
     assert twins.cases == 150
+
+
+@built
+@pytest.mark.parametrize('loss_law', LOSS_LAWS)
+def test_the_last_resort_on_half_shafts_has_the_same_bits(loss_law, monkeypatch):
+    monkeypatch.setattr('dm_ros.motion.coupled.MOST_TRIALS', 3)
+    twins = Twins(loss_law, ported=True)
+    for n in range(30):
+        twins.run(n)
+    print(twins)
+    assert twins.coarse_steps > 30
+
+
+@built
+def test_steps_with_half_shafts_are_in_the_language_that_was_chosen(monkeypatch):
+    for coupled_step, language in ((core._chosen('').coupled_step, 'C'), (None, 'Python')):
+        monkeypatch.setattr(core, 'coupled_step', coupled_step)
+        assert Simulation('lsd_ode', ports={'front': (1e4, 100.0)}).language == language
 
 
 @built
@@ -87,6 +106,22 @@ def test_what_is_no_model_and_no_number_is_refused(monkeypatch):
             getattr(ticker, name)(*arguments)
     with pytest.raises(TypeError, match='x must be a tuple of 2 numbers'):
         ticker.state = ticker.state._replace(x=(0.0,))
+
+
+@built
+@pytest.mark.parametrize('n, value, words', [
+    (0, bytes(8), 'model must be [0-9]+ bytes, not 8'),
+    (1, (0.0, 0.0), 'x must be a tuple of 3 numbers'),
+    (2, (0.0, 'a'), 'must be real number'),
+    (3, (0.0, 0.0), 'inputs must be a tuple of 3 numbers or None'),
+    (3, (0.0, 'a', 0.0), 'must be real number')])
+def test_what_is_no_step_on_half_shafts_is_refused(n, value, words):
+    model = Simulation('lsd_ode', ports={'front': (1e4, 100.0)})._ticker.model
+    arguments = [packed_coupling(model), (1.0, 0.0, 0.0), (0.0, 0.0), (5.0, None, 0.0), 1, True]
+    core._chosen('').coupled_step(*arguments)
+    arguments[n] = value
+    with pytest.raises(TypeError, match=words):
+        core._chosen('').coupled_step(*arguments)
 
 
 @built

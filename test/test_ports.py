@@ -398,6 +398,18 @@ def test_a_tick_takes_a_bounded_number_of_parts_and_says_when_it_was_coarse(monk
     assert simulation.coarse_steps > 0
 
 
+def test_what_would_grow_beyond_all_numbers_within_a_tick_is_taken_in_parts():
+    # light gears at rest, of which one begins to give power as soon as it turns
+    p = SymmetricParameters(I_0=0.01, I_1=2e-4, I_2=3e-4, I_3=2e-3, eta_3B=0.5, eta_FG=0.5,
+                            eta_0B=0.4, eta_1G=0.4, sign_speed=0.009)
+    audit = AuditedSimulation('symmetric_ode', 1.5e-3, p,
+                              ports=ports_of('symmetric_ode', 1, shaft=(1e5, 0.0)))
+    for _ in range(5):
+        snapshot = audit.step((6.0, -10.0, -500.0))
+        assert snapshot.energy.relative_residual < 1e-6
+    assert audit.coarse_steps == 0 and snapshot.velocity[2] < -10.0
+
+
 def test_the_last_resort_obeys_the_equations_at_its_end():
     simulation = Simulation('lsd_ode', 5e-3, ports=ports_of('lsd_ode', 1, 2))
     model = simulation._ticker.model

@@ -14,7 +14,8 @@ the inertia I_j of the shaft: a speed like the others, by which the matrices are
 
 The step is the one of ``adaptive`` in more dimensions: exact where all is linear, however stiff or
 light, since the exponential of the whole is taken. As more than two modes may turn round within a
-part, what is not linear is looked for on the way too, and not at its ends alone.
+part, what is not linear is looked for on the way too, and not at its ends alone. core/coupled.c
+repeats all of it line by line.
 """
 
 import math
@@ -235,8 +236,10 @@ def step(equations, z, h, tolerance, exponentials):
                 D = [part * (a - b - g) for a, b, g in zip(there.slope, here.slope, back)]
                 seen = size(times(implicit(J_there, part), D))
                 error = max(error, seen / (BACKWARD * allowed))
-        if not math.isfinite(error):
-            raise ArithmeticError('beyond the range of floating point numbers')
+        if not math.isfinite(error):   # what grows may do so beyond all numbers in a long part
+            if not math.isfinite(size(here.slope)):
+                raise ArithmeticError('beyond the range of floating point numbers')
+            error = math.inf
         if error <= 1.0:
             integral = [total + (part * a + b + part * g / 4) for total, a, b, g in zip(
                 integral, here.z, way.integral, c)]

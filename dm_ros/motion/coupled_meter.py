@@ -24,6 +24,7 @@ class CoupledMeter:
     def __init__(self, model):
         self._model, self._inner = model, meters.meter_of(model.inner)
         mechanism = model.mechanism
+        model.keeps_books = True
         self._own = 1 + len(mechanism.gears + mechanism.bearings + mechanism.clutches)
 
     def stored_energy(self, x):
@@ -36,7 +37,8 @@ class CoupledMeter:
     def book(self, step, inputs):
         """Return the energies of a step, see ``meters``; those of the half-shafts follow."""
         model = self._model
-        x, flow, end, integral, _, _, (equations, parts) = step
+        x, flow, end, integral, _, _, path = step
+        lost, damped, numerical = path if model.language == 'C' else self._along(flow, *path)
         T = model.mean_torques(inputs, [step])
         angles = self._inner.angles(integral[:2])
         outside = {shaft.port: inputs[shaft.port] for shaft in model.half_shafts}
@@ -45,16 +47,19 @@ class CoupledMeter:
         stored = energy_gained(self._inner.form, x[:2], end[:2])
         for shaft, a, b in zip(model.half_shafts, x[2:], end[2:]):
             stored += shaft.stiffness * (b - a) * (b + a) / 2
+        return *work, stored, *lost, *damped, numerical
+
+    def _along(self, flow, equations, parts):
+        """Return what the elements and the half-shafts lost, and what the error took."""
         lost = [0.0] * (self._own + len(equations.half_shafts))
         numerical = 0.0
         for part in parts:
             more, taken = self._part(equations, flow, part)
             lost = list(map(add, lost, more))
             numerical += taken
-        damped = dict(zip((shaft.port for shaft in equations.half_shafts),
-                          lost[self._own:]))
-        return (*work, stored, *lost[:self._own],
-                *(damped.get(shaft.port, 0.0) for shaft in model.half_shafts), numerical)
+        damped = dict(zip([shaft.port for shaft in equations.half_shafts], lost[self._own:]))
+        return (lost[:self._own],
+                [damped.get(shaft.port, 0.0) for shaft in self._model.half_shafts], numerical)
 
     def _powers(self, equations, flow, z, looked):
         """Return what each element loses at a state, W, the half-shafts last."""

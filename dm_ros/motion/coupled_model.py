@@ -5,6 +5,7 @@
 
 from operator import add
 
+from dm_ros import core
 from dm_ros.mechanism.variants import SYMMETRIC
 from dm_ros.motion import adaptive, coupled
 from dm_ros.motion.coupled import Equations, HalfShaft
@@ -16,6 +17,7 @@ from dm_ros.motion.models import (
     PAPER,
     PassiveModel,
 )
+from dm_ros.motion.packing import packed_coupling
 
 
 def half_shafts_of(mechanism, p, ports):
@@ -40,7 +42,7 @@ class CoupledModel:
     its twist zero.
     """
 
-    language = 'Python'   # of its steps
+    keeps_books = False   # whether steps in C shall tell what was lost
 
     def __init__(self, formulation, mechanism, loss_law, parameters, h, ports):
         self.parameters, self.h = parameters, h
@@ -54,9 +56,15 @@ class CoupledModel:
             self._law = adaptive.PASSIVE
         self.lagged = self.inner.lagged
         self.half_shafts = half_shafts_of(mechanism, parameters, ports)
-        self._exponentials = Exponentials()
+        self._exponentials, self._coupled_step = Exponentials(), core.coupled_step
+        self._packed = packed_coupling(self)
         self.independent = self.inner.independent
         self.friction, self.remembered = self.inner.friction, self.inner.remembered
+
+    @property
+    def language(self):
+        """What the steps are made in."""
+        return 'C' if self._coupled_step else 'Python'
 
     def all_shafts(self, x):
         """Return the speeds of all shafts from x, or their angles from its integral."""
@@ -90,7 +98,13 @@ class CoupledModel:
         return self.inner.flow(x[:2], self.torques(x, inputs), deadband, last)
 
     def step(self, x, S, inputs, flow):
-        """Advance by h; see ``models`` for what is returned, the path are equations and parts."""
+        """
+        Advance by h; see ``models`` for what is returned.
+
+        The path are equations and parts; from C what was lost instead, or None.
+        """
+        if self._coupled_step:
+            return self._coupled_step(self._packed, x, S, inputs, flow, self.keeps_books)
         w, s, *twists = x
         active = [n for n, shaft in enumerate(self.half_shafts)
                   if inputs[shaft.port] is not None]

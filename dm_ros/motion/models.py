@@ -53,6 +53,7 @@ def no_solution(parameters):
 class Model:
     """What all have in common; x is (w, s), the carrier speed and the slip omega_1 - omega_2."""
 
+    language = 'Python'
     lagged = False
     half_shafts = ()
 

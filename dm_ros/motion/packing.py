@@ -8,10 +8,12 @@ from itertools import chain
 import struct
 
 from dm_ros.mechanism.power_flow import DIRECT, REVERSE
+from dm_ros.motion import coupled
 from dm_ros.motion.models import ClutchedModel, PassiveModel, SymmetricModel
 
 LAW = 2 * 59   # numbers of the largest of the laws
 LOSSES = 23    # numbers of the larger losses under the paper's law
+SHAFTS = 3 * 6   # numbers of as many half-shafts as there may be
 
 
 def packed(model, run):
@@ -33,6 +35,17 @@ def packed(model, run):
             *chain.from_iterable(of_clutches)]
     law = _law(model)
     numbers = [*head, *law, *[0.0] * (LAW - len(law))]
+    return struct.pack(f'{len(numbers)}d', *numbers)
+
+
+def packed_coupling(model):
+    """Return a ``CoupledModel`` as bytes, see core/coupled.h."""
+    inner, mechanism, shafts = model.inner, model.mechanism, list(chain(*model.half_shafts))
+    elements = 1 + len(mechanism.gears + mechanism.bearings + mechanism.clutches)
+    law = _law(inner)
+    numbers = [bool(inner.g_F), isinstance(inner, PassiveModel), elements, model.h,
+               inner.tolerance, coupled.MOST_TRIALS, *inner.form, len(model.half_shafts),
+               *shafts, *[0.0] * (SHAFTS - len(shafts)), *law, *[0.0] * (LAW - len(law))]
     return struct.pack(f'{len(numbers)}d', *numbers)
 
 

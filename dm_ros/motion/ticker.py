@@ -38,12 +38,15 @@ class Ticker:
     :param model: see ``models``; run: a ``Run``; books: ``Books``, or None.
     """
 
-    language = 'Python'
-
     def __init__(self, model, run, books=None):
         self.model, self.run, self.books = model, run, books
         self.deadband = 0.0   # W
         self.ticks = self.coarse_steps = 0
+
+    @property
+    def language(self):
+        """What the steps are made in."""
+        return self.model.language
 
     def reset(self, velocity):
         """Go back to the start, at speeds of the output shafts, rad/s."""
