@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run watch test test-long lint bench bench-loop bench-restarts soak compare docs colcon test-jazzy-versions clean
+.PHONY: help setup run watch test test-long lint bench bench-sweep bench-loop bench-restarts soak compare docs colcon test-jazzy-versions clean
 
 PYTHON = python3
 VARIANT = symmetric_ode
@@ -92,6 +92,9 @@ bench: .venv-bench/done  ## measure what a step costs, beside other tools, and h
 	env -u PYTHONPATH .venv-bench/bin/python bench/step.py $(BENCH_ARGS)
 	env -u PYTHONPATH .venv-bench/bin/python bench/half_shafts.py $(BENCH_ARGS)
 	env -u PYTHONPATH .venv-bench/bin/python bench/ensemble.py $(BENCH_ARGS)
+
+bench-sweep: setup  ## measure how time and memory of sweeps grow with the sets: BENCH_ARGS
+	.venv/bin/python bench/sweep.py $(BENCH_ARGS)
 
 bench-loop: setup  ## measure how the node holds its rate, beside a loop in C: BENCH_ARGS
 	.venv/bin/python bench/loop.py $(BENCH_ARGS)

@@ -21,6 +21,7 @@ COMMANDS = {
     'identify': ('tools.identify', False),
     'play_torques': ('tools.play_torques', True),
     'simulate': ('tools.simulate', False),
+    'sweep': ('tools.sweep', False),
     'urdf': ('tools.urdf', False),
     'watch': ('tools.watch', True),
 }
@@ -37,8 +38,8 @@ def run(name, args=None):
     return import_module(f'dm_ros.{module}').main(args)
 
 
-(bias, compare_variants, demo, differential, export_fmu, identify, play_torques, simulate, urdf,
- watch) = (partial(run, name) for name in COMMANDS)
+(bias, compare_variants, demo, differential, export_fmu, identify, play_torques, simulate, sweep,
+ urdf, watch) = (partial(run, name) for name in COMMANDS)
 
 
 if __name__ == '__main__':   # python -m dm_ros.commands NAME ...

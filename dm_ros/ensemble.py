@@ -15,7 +15,7 @@ import struct
 import numpy as np
 
 from dm_ros import core
-from dm_ros.mechanism.sets import array_of_sets, named, table_of
+from dm_ros.mechanism.sets import array_of_sets, has_clutches, named, table_of
 from dm_ros.mechanism.variants import equipped, variant_named
 from dm_ros.motion.checks import checked
 from dm_ros.motion.models import no_solution, PASSIVE
@@ -74,10 +74,7 @@ class Ensemble:
 
     def _check_clutches(self, kind, expected):
         """Refuse sets with clutches beside others without."""
-        symbols = list(kind.rows())
-        if kind.has_clutches is True:
-            return
-        surfaces = self._numbers[:, [symbols.index('n_F1'), symbols.index('n_F2')]].any(axis=1)
+        surfaces = has_clutches(kind, self._numbers)
         if (surfaces != expected).any():
             raise ValueError(
                 f'parameters[{int((surfaces != expected).argmax())}]: {kind.prefix}.clutch: sets '

@@ -5,8 +5,12 @@
 
 from collections.abc import Mapping
 from dataclasses import astuple
+import math
+from types import SimpleNamespace
 
 import numpy as np
+
+from dm_ros.mechanism.parameters import ClutchedParameters
 
 
 def array_of_sets(kind, parameters):
@@ -39,6 +43,34 @@ def table_of(kind, numbers, n):
         return kind(**{symbol: int(value) if row.kind is int and value.is_integer() else value
                        for (symbol, (_, row)), value in zip(kind.rows().items(),
                                                             numbers[n].tolist())})
+
+
+def has_clutches(kind, numbers):
+    """Return which of many sets, (n, parameters), give a mechanism clutches, (n,)."""
+    if kind.has_clutches is True:
+        return np.ones(len(numbers), bool)
+    p = by_symbol(kind, numbers)
+    return (p.n_F1 > 0.0) | (p.n_F2 > 0.0)
+
+
+def possible(kind, numbers):
+    """Return which of many sets, each within what is allowed, make no impossible mechanism."""
+    p = by_symbol(kind, numbers)
+    angles, places = np.unique(p.alpha, return_inverse=True)
+    tangents = np.array([math.tan(angle) for angle in angles])[places]   # numpy has other bits
+    good = getattr(p, 'g_F', tangents + 1.0) != 0.0
+    for f, eta in zip(ClutchedParameters.f.fget(p), (p.eta_1G, p.eta_2G)):
+        good &= (tangents * f == 0.0) | (tangents * f < eta * p.eta_0B)
+    return good
+
+
+def by_symbol(kind, numbers):
+    """Return the columns of many sets as what the attributes of a table are of one."""
+    p = SimpleNamespace(**dict(zip(kind.rows(), numbers.T)))
+    if not hasattr(p, 'R_1'):
+        p.R_1 = p.R_2 = p.R   # there is one radius
+    p.g_12 = p.R_2 / p.R_1
+    return p
 
 
 class named:

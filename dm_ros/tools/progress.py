@@ -6,7 +6,7 @@
 from tqdm import tqdm
 
 
-def progress(iterable=None, total=None, unit='tick'):
+def progress(iterable=None, total=None, unit='tick', initial=0):
     """Return a bar on stderr; it shows on a terminal alone, after a second, for a known total."""
-    return tqdm(iterable, total=total, unit=unit, unit_scale=True, delay=1.0, leave=False,
-                dynamic_ncols=True, disable=True if total is None else None)
+    return tqdm(iterable, total=total, initial=initial, unit=unit, unit_scale=True, delay=1.0,
+                leave=False, dynamic_ncols=True, disable=True if total is None else None)
