@@ -3,13 +3,22 @@
 
 """Many differentials at once: the bits of single runs, all or none of the sets, failures apart."""
 
+from dataclasses import astuple
 from unittest import mock
 
 import numpy as np
 from properties import random_case
 import pytest
 
-from dm_ros import core, Ensemble, SelfLockingParameters, Simulation, VARIANTS
+from dm_ros import (
+    core,
+    Ensemble,
+    SelfLockingParameters,
+    Simulation,
+    SymmetricParameters,
+    VARIANTS,
+)
+from dm_ros.mechanism.sets import possible, table_of
 from dm_ros.motion.models import LOSS_LAWS
 
 built = core._chosen('') is not None
@@ -172,3 +181,26 @@ def test_what_is_for_all_is_checked_as_by_a_simulation(language):
                         ({'variant': 'x'}, "variant: 'x'")):
         with pytest.raises(ValueError, match=words):
             Ensemble(**{'variant': 'lsd_ode', 'parameters': [{}], **more})
+
+
+@pytest.mark.parametrize('kind', [SelfLockingParameters, SymmetricParameters])
+def test_the_sets_that_are_possible_are_those_that_a_table_takes(kind):
+    rng, count = np.random.default_rng(4), 400
+    numbers = np.tile(np.array(astuple(kind()), float), (count, 1))
+    p = {symbol: numbers[:, n] for n, symbol in enumerate(kind.rows())}
+    p['alpha'][:] = rng.choice([0.0, 0.2, 0.5], count)
+    for n in '12':
+        p[f'n_F{n}'][:] = rng.integers(0, 4, count)
+        gain = 3 * np.tan(0.2) * p[f'R_F{n}'] / p.get(f'R_{n}', p.get('R'))
+        p[f'mu_{n}'][:] = rng.choice([0.5, 1 - 1e-15, 1.0, 1.5], count) * 0.99 * 0.995 / gain
+    if 'g_F' in p:
+        p['g_F'][::7] = 0.0
+    found = possible(kind, numbers)
+    assert 0.1 < found.mean() < 0.9
+    for n, is_possible in enumerate(found):
+        try:
+            table_of(kind, numbers, n)
+        except ValueError:
+            assert not is_possible, n
+        else:
+            assert is_possible, n
