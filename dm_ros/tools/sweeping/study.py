@@ -8,6 +8,7 @@ It is plain data, which goes to other machines as it is. Nothing in a result dep
 sets are computed together, or where.
 """
 
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
@@ -88,12 +89,17 @@ def digest(array):
 class Computation:
     """The metrics of some sets; ``table`` is (sets, metrics and place in ``STATUS``)."""
 
-    def __init__(self, study, columns, threads=None):
-        """:param columns: ``{full name: (sets,)}`` of what is varied; threads: of ``Ensemble``."""
+    def __init__(self, study, columns, threads=None, stop=None):
+        """
+        Compute it.
+
+        :param columns: ``{full name: (sets,)}`` of what is varied; threads: of ``Ensemble``.
+        :param stop: an ``Event`` that ends the work by ``CancelledError``, or None.
+        """
         if study.version != own_version():
             raise ValueError(f'dm_ros is {own_version()} here and {study.version} where the sweep '
                              'began')
-        self._study, self._threads = study, threads
+        self._study, self._threads, self._stop = study, threads, stop
         count = len(next(iter(columns.values())))
         self._start = np.stack([np.broadcast_to(columns.get(name, speed), count)
                                 for name, speed in study.start.items()], axis=1)
@@ -135,6 +141,8 @@ class Computation:
         start, kept = {name: getattr(ensemble, name) for name in record}, []
         forces = study.forces if ensemble.clutches else None
         for first in range(0, len(study.torques), AT_ONCE):
+            if self._stop and self._stop.is_set():
+                raise CancelledError
             part = slice(first, first + AT_ONCE)
             recorded = ensemble.run(study.torques[part],
                                     None if forces is None else forces[part], record)
