@@ -54,11 +54,11 @@ class Ensemble:
         kind = self._variant.mechanism.parameters
         self._numbers = numbers = array_of_sets(kind, parameters)
         first = table_of(kind, numbers, 0)
-        # what is the same for all is checked by the simulation of one
+        same = {'loss_law': loss_law, 'substeps': substeps,
+                'power_flow_deadband': power_flow_deadband}
+        Simulation(variant, dt, **same)   # what is the same for all is of no set
         with named(0):
-            self._one = one = Simulation(
-                variant, dt, first, loss_law=loss_law, substeps=substeps,
-                power_flow_deadband=power_flow_deadband)
+            self._one = one = Simulation(variant, dt, first, **same)
         self._mechanism = equipped(self._variant.mechanism, first)
         self._check_clutches(kind, first.has_clutches)
         speeds = self._checked('initial_velocity', initial_velocity, one.outputs, -1e6, 1e6)
@@ -149,7 +149,10 @@ class Ensemble:
         :param clutch_forces: N, (clutches,) for all or (n, clutches); None for none.
         :raises ValueError: for what are not as many finite numbers, or a force below 0.
         """
-        self.run([torques], None if clutch_forces is None else [clutch_forces])
+        T = self._checked('torques', torques, self.inputs)
+        A = None if clutch_forces is None else [
+            self._checked('clutch_forces', clutch_forces, self.clutches, 0.0)]
+        self.run([T], A)
 
     def run(self, torques, clutch_forces=None, record=()):
         """
@@ -161,6 +164,7 @@ class Ensemble:
         :return: ``{name: array}`` of these, at the end of each tick, (ticks, n, ...).
         :raises ValueError: as ``step``; nothing has moved then.
         """
+        record = (record,) if isinstance(record, str) else record
         for name in record:
             if name not in PLACES:
                 raise ValueError(f'record: {name!r} is not one of {", ".join(PLACES)}')
@@ -189,25 +193,29 @@ class Ensemble:
 
     def _run_of(self, what, values, names, low=-np.inf):
         """Return values over time as (ticks, 1 or n, names)."""
-        rows = self._checked(what, values, names, low, np.inf, lambda shape: shape[1:])
+        rows = self._checked(what, values, names, low, is_run=True)
         if rows.ndim < 3:
             rows = rows.reshape(-1, 1, len(names))
         return rows
 
-    def _checked(self, what, values, names, low, high, each=lambda shape: shape):
+    def _checked(self, what, values, names, low=-np.inf, high=np.inf, is_run=False):
         """Return values as floats, one for each name last; raise ValueError for others."""
         n, wide = len(self), len(names)
         try:
             rows = np.ascontiguousarray(values, float)
         except (TypeError, ValueError):
             raise ValueError(f'{what}: they must be numbers, for {", ".join(names)}') from None
-        if each(rows.shape) not in ((wide,), (n, wide)):
-            raise ValueError(f'{what}: they have the shape {rows.shape}, each must be of '
-                             f'{(wide,)} or {(n, wide)}, for {", ".join(names) or "no clutch"}')
+        if rows.shape[is_run:] not in ((wide,), (n, wide)):
+            ticks = 'ticks, ' * is_run
+            raise ValueError(
+                f'{what}: they have the shape {rows.shape}, it must be ({ticks}{wide}'
+                f'{"" if is_run else ","}) or ({ticks}{n}, {wide}), for '
+                f'{", ".join(names) or "no clutch"}')
         bad = ~(np.isfinite(rows) & (rows >= low) & (rows <= high))
         if bad.any():
             *place, column = np.argwhere(bad)[0].tolist()
-            allowed = 'finite' + (f', in [{low:g}, {high:g}]' if np.isfinite(low) else '')
+            allowed = ('finite' if low == -np.inf else f'finite and at least {low:g}'
+                       if high == np.inf else f'in [{low:g}, {high:g}]')
             raise ValueError(f'{what}{place or ""}: {names[column]}: {rows[bad][0]} is not '
                              f'allowed, it must be {allowed}')
         return rows
@@ -292,8 +300,9 @@ class InC:
                             0.0)
         bad = min(self._all(lambda first, last: self._refused(setup, numbers, first, last)))
         if bad < self._n:
+            table = table_of(kind, numbers, bad)
             with named(bad):
-                raise no_solution(table_of(kind, numbers, bad))
+                raise no_solution(table)
 
     def _refused(self, setup, numbers, first, last):
         made = self._core.make_all(setup, numbers, self._models, first, last)

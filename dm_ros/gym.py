@@ -16,6 +16,7 @@ from gymnasium.vector.utils import batch_space
 import numpy as np
 
 from dm_ros.ensemble import Ensemble
+from dm_ros.motion.checks import checked
 
 VARIANT = 'symmetric_ode'
 AXLE = {   # of the preset actuated_axle, with the inertia of wheels
@@ -60,13 +61,18 @@ class SlipControlVectorEnv(VectorEnv):
     metadata = {'autoreset_mode': AutoresetMode.NEXT_STEP, 'render_modes': []}
 
     def __init__(self, num_envs=1, duration=4.0, randomize=None):
-        self.num_envs = num_envs
+        self.num_envs = num_envs = int(checked(
+            'num_envs', num_envs, lambda v: v >= 1 and v == int(v), 'a positive integer'))
+        self._steps = round(checked('duration', duration, lambda v: v >= TICK * TICKS,
+                                    f'{TICK * TICKS:g} s at least') / (TICK * TICKS))
         self.single_action_space = Box(0.0, 1.0, (1,), np.float32)
         self.single_observation_space = Box(-FASTEST, FASTEST, (len(self.OBSERVED),), np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._steps = round(duration / (TICK * TICKS))
-        self._ranges = dict(randomize or {})
+        self._ranges = {name: _range(name, limits) for name, limits in (randomize or {}).items()}
+        for end in (0, 1):   # what is not allowed is told at once
+            Ensemble(VARIANT, [AXLE | {name: limits[end] for name, limits
+                                       in self._ranges.items()}], TICK)
         self._ensemble = None
         self._left = 0   # steps of the episode
 
@@ -87,7 +93,11 @@ class SlipControlVectorEnv(VectorEnv):
         if not self._left:
             self._begin()
             return self._observed(), np.zeros(self.num_envs), none, none.copy(), {}
-        pressed = np.clip(np.asarray(actions, float).reshape(self.num_envs), 0.0, 1.0)
+        actions = np.asarray(actions, float)
+        if actions.shape != (self.num_envs, 1) or np.isnan(actions).any():
+            raise ValueError(f'actions: {actions.tolist()!r} must be numbers of the shape '
+                             f'{(self.num_envs, 1)}')
+        pressed = np.clip(actions[:, 0], 0.0, 1.0)
         rewards = sum(self._tick(pressed) for _ in range(TICKS))
         self._left -= 1
         return self._observed(), rewards, none, np.full(self.num_envs, not self._left), {}
@@ -140,6 +150,17 @@ class SlipControlVectorEnv(VectorEnv):
         return np.clip(np.column_stack((
             left, right, left - right, self._speed, self._curve, self._torque, share)),
             -FASTEST, FASTEST).astype(np.float32)
+
+
+def _range(name, limits):
+    """Return the ends of a range as floats; raise ValueError that names what is wrong."""
+    try:
+        low, high = map(float, limits)
+    except (TypeError, ValueError):
+        low = high = np.nan
+    if not low <= high:
+        raise ValueError(f'randomize: {name}: {limits!r} must be (low, high)')
+    return low, high
 
 
 class SlipControlEnv(gymnasium.Env):

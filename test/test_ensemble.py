@@ -143,7 +143,7 @@ def test_a_member_that_leaves_the_range_of_numbers_fails_alone(language):
     (3, 'int is not a sequence of sets or a mapping of arrays'),
     ([3], r'parameters\[0\]: int is not SelfLockingParameters or a mapping'),
     ([{}, {'lsd.clutch.rear.friction_coefficient': 5.0}],
-     r'parameters\[1\]: lsd.clutch.rear: the clutch locks itself'),
+     r'^parameters\[1\]: lsd.clutch.rear: the clutch locks itself'),
     ([SelfLockingParameters()] * 2 + [SelfLockingParameters(
         I_0=1e-300, I_1=1e-300, I_2=1e-300, I_s=1e-300)],
      r'parameters\[2\]: lsd: the equations of these parameters have no finite solution'),
@@ -159,11 +159,11 @@ def test_clutches_and_none_are_not_mixed(language):
 
 
 @pytest.mark.parametrize('torques, forces, words', [
-    ((1.0, 2.0), None, r'torques: they have the shape \(1, 2\), each must be of \(3,\) or'),
-    ([(1.0, 2.0, 3.0)] * 3, None, r'each must be of \(3,\) or \(2, 3\)'),
-    ((1.0, 2.0, np.inf), None, r'torques\[0\]: rear: inf is not allowed'),
+    ((1.0, 2.0), None, r'torques: they have the shape \(2,\), it must be \(3,\) or \(2, 3\)'),
+    ([(1.0, 2.0, 3.0)] * 3, None, r'the shape \(3, 3\), it must be \(3,\) or \(2, 3\)'),
+    ((1.0, 2.0, np.inf), None, 'torques: rear: inf is not allowed'),
     ('abc', None, 'torques: they must be numbers, for carrier, front, rear'),
-    ((0.0,) * 3, (-1.0, 0.0), r'front: -1.0 is not allowed, it must be finite, in \[0, inf\]'),
+    ((0.0,) * 3, (-1.0, 0.0), 'front: -1.0 is not allowed, it must be finite and at least 0'),
     ((0.0,) * 3, (1.0,), 'clutch_forces: they have the shape'),
 ])
 def test_bad_inputs_are_named_and_nothing_moves(torques, forces, words, language):
@@ -174,7 +174,7 @@ def test_bad_inputs_are_named_and_nothing_moves(torques, forces, words, language
 
 
 def test_what_is_for_all_is_checked_as_by_a_simulation(language):
-    for more, words in (({'dt': 0.0}, 'dt: 0.0'), ({'substeps': 0}, 'substeps: 0'),
+    for more, words in (({'dt': 0.0}, '^dt: 0.0'), ({'substeps': 0}, 'substeps: 0'),
                         ({'loss_law': 'none'}, 'loss_law'), ({'threads': 0}, 'threads: 0'),
                         ({'threads': 2.5}, 'threads: 2.5'), ({'threads': 'a'}, "threads: 'a'"),
                         ({'initial_velocity': (1e7, 0.0)}, 'initial_velocity: front: 10000000.0'),

@@ -84,12 +84,6 @@ def test_parameters_are_drawn_anew_for_each_axle_and_episode():
     assert len(set(drawn)) == 10 and min(drawn) >= 0.07 and max(drawn) <= 0.13
 
 
-def test_a_range_that_is_not_allowed_is_refused():
-    axles = SlipControlVectorEnv(2, randomize={'symmetric.inertia.left': (-2.0, -1.0)})
-    with pytest.raises(ValueError, match='symmetric.inertia.left: -1.* is not allowed'):
-        axles.reset(seed=0)
-
-
 def test_pressing_holds_the_shafts_together():
     open_axle, locked = (episode(SlipControlVectorEnv(16, 2.0), held(share))[0][-1]
                          for share in (0.0, 1.0))
@@ -112,3 +106,24 @@ def test_a_controller_of_slip_is_better_than_any_constant_force():
     for each in pressed:
         assert 0.3 < (each > free).mean() < 0.9
         assert controlled.mean() > max(free.mean(), each.mean())
+
+
+@pytest.mark.parametrize('arguments, words', [
+    ({'duration': 0.005}, 'duration: 0.005 is not allowed, it must be 0.01 s at least'),
+    ({'duration': float('nan')}, 'duration: nan'), ({'duration': 'a'}, "duration: 'a'"),
+    ({'num_envs': 0}, 'num_envs: 0'), ({'num_envs': 1.5}, 'num_envs: 1.5'),
+    ({'randomize': {'symmetric.inertia.left': 1.0}}, r'symmetric.inertia.left: 1.0 must be \(low'),
+    ({'randomize': {'symmetric.inertia.left': (2.0, 1.0)}}, r'\(2.0, 1.0\) must be \(low, high\)'),
+    ({'randomize': {'symmetric.inertia.left': (-1.0, 1.0)}}, 'symmetric.inertia.left: -1.0'),
+    ({'randomize': {'symmetric.inertia.lift': (1.0, 2.0)}}, 'there is no such parameter')])
+def test_what_is_not_allowed_is_refused_at_once_and_named(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        SlipControlVectorEnv(**arguments)
+
+
+@pytest.mark.parametrize('actions', [[[0.1]], [[0.1, 0.1]], [0.1, 0.1], [[0.1], [np.nan]]])
+def test_actions_of_another_shape_and_no_numbers_are_refused(actions):
+    axles = SlipControlVectorEnv(2)
+    axles.reset(seed=1)
+    with pytest.raises(ValueError, match=r'actions: .* must be numbers of the shape \(2, 1\)'):
+        axles.step(actions)
