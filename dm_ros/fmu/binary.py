@@ -14,6 +14,7 @@ import sys
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from dm_ros.files.output import replacing
 from dm_ros.fmu.sources import compiled, OPTIONS
 
 COMPILERS = 'cc', 'gcc', 'clang'
@@ -89,7 +90,8 @@ def library(command, files, target):
         for name, content in files.items():
             path = Path(folder, name)
             path.parent.mkdir(exist_ok=True)
-            path.write_bytes(content)
+            with replacing(path, 'wb') as file:
+                file.write(content)
         made = Path(folder, f'made{SUFFIXES.get(target.rpartition("-")[2], ".so")}')
         is_windows = target.endswith('windows')
         options = [*OPTIONS, '-shared', '-fvisibility=hidden', '-Iheaders',

@@ -16,6 +16,8 @@ import shutil
 
 import numpy as np
 
+from dm_ros.files.output import replacing
+
 MANIFEST = 'study.json'
 
 
@@ -82,14 +84,11 @@ class Chunks:
 
 def _write(path, content):
     """Write bytes so that after any crash the file is whole or not there."""
-    folder, name = os.path.split(path)
-    unfinished = os.path.join(folder, f'.{name}.part')
-    with open(unfinished, 'wb') as file:
+    with replacing(path, 'wb') as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
-    os.rename(unfinished, path)
-    handle = os.open(folder, os.O_RDONLY)
+    handle = os.open(os.path.dirname(path), os.O_RDONLY)
     try:
         os.fsync(handle)   # the new name, too
     finally:
