@@ -103,6 +103,26 @@ def identify(variant, *arguments):
 
 # what it finds
 
+@pytest.mark.parametrize('seed', [102, 103, 105])
+def test_a_fit_is_not_lost_where_a_clutch_locks_itself(folder, capsys, seed):
+    """The first step from the defaults leads beyond: what is known of that keeps the fit off."""
+    random = np.random.default_rng(seed)
+    f, a = random.uniform(0.4, 2.0, 3), random.uniform(30.0, 120.0, 3)
+
+    def load(time):
+        swing = np.sin(2 * np.pi * f * time)
+        return (a[0] * swing[0] + 100.0, -a[1] / 2 * abs(swing[1]) - 20.0,
+                -a[2] / 2 * abs(swing[2]) - 20.0)
+    truth = {'lsd.inertia.rear': 0.02, 'lsd.clutch.rear.friction_coefficient': 0.1,
+             'lsd.clutch.front.preload': 250.0}
+    write_log(folder / 'LOG.csv', 'lsd_ode', truth, white(seed), ticks=400, dt=0.005, load=load)
+    assert identify('lsd_ode', '--report', 'R.json', '--fit', *truth) == 0
+    report = json.loads((folder / 'R.json').read_text())
+    for name, entry in report['parameters'].items():
+        half = (entry['high'] - entry['low']) / 2   # 95 %: two standard errors
+        assert abs(entry['estimate'] - truth[name]) < 2 * half < truth[name]
+
+
 @pytest.mark.parametrize('truth', [CARRIER, CLUTCH], ids=['symmetric', 'lsd'])
 def test_the_intervals_hold_the_truth_as_often_as_they_say(truth):
     """Of 40 noisy drives; both ends of what is plausible for 95 %."""
@@ -199,6 +219,12 @@ def test_the_fitted_file_makes_simulate_run_as_the_fit_and_keeps_what_was_given(
     for name, entry in report['parameters'].items():
         assert entry['low'] < entry['alone_low'] < entry['estimate'] < entry['high']
         assert entry['start'] == (1e-5 if 'viscosity' in name else 0.1)
+
+
+def test_the_fitted_file_has_the_rate_that_the_fit_had(folder):
+    write_log(folder / 'LOG.csv', 'symmetric_ode', CARRIER, white(3))
+    assert identify('symmetric_ode', '--dt', '0.05', '--out', 'F.yaml', '--fit', *CARRIER) == 0
+    assert read_parameter_file('F.yaml')['rate'] == 20.0
 
 
 def test_equal_drives_give_equal_bytes(folder):
@@ -356,7 +382,10 @@ BAD = {   # words: (arguments, change of LOG.csv)
         [START], ('velocity.', 'x.')),
     "LOG.csv:1: column 'velocity.front': there is no such shaft, the symmetric differential has "
     'carrier, left, right': ([START], ('velocity.left', 'velocity.front')),
-    "LOG.csv:1: column 'speed': unknown": ([START], ('velocity.left', 'speed')),
+    "LOG.csv:1: column 'speed': unknown, the columns are time, pinion, left, right; "
+    '--ignore-columns "speed" passes over': ([START], ('velocity.left', 'speed')),
+    "LOG.csv:1: column 'time;pinion;left;right;velocity.left;velocity.right': unknown, the "
+    'columns are time, pinion, left, right; it has semicolons': ([START], (',', ';')),
     "LOG.csv:1: column 'velocity.left': it appears twice": (
         [START], ('velocity.right', 'velocity.left')),
     "LOG.csv:1: column 'speed': it is not there to be ignored": (

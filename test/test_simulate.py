@@ -381,7 +381,8 @@ def test_a_clutch_that_is_not_there_has_no_column(folder, capfd):
 
 
 BAD_TABLES = {
-    "IN.csv:1: column 'time': missing": '',
+    'IN.csv:1: the file is empty': '',
+    "IN.csv:1: column 'time': missing": 'pinion,left,right\n1,2,3\n',
     "IN.csv:1: column 'right': missing": 'time,pinion,left\n0,1,2\n1,1,2\n',
     "IN.csv:1: column 'front': unknown": 'time,pinion,left,right,front\n0,1,2,3,4\n',
     "IN.csv:1: column '': unknown": 'time,pinion,left,right,\n0,1,2,3,\n',

@@ -34,7 +34,8 @@ def read_measured_file(path, mechanism, ignored=()):
     It is a table of torques as ``read_torque_file`` reads it with columns ``velocity.<shaft>``
     beside, what was measured at the time of the row, where an empty cell is no measurement. Or it
     is what ``simulate`` writes, known by its columns ``torque.<shaft>``: those of a row were in
-    force until its time, and columns of other kinds are passed over.
+    force until its time, the speeds are those of the output shafts, and all other columns are
+    passed over.
 
     :param mechanism: the ``Mechanism`` to run; ignored: names of further columns to pass over.
     :raises ValueError: one line that names file, line and column.
@@ -48,16 +49,19 @@ def read_measured_file(path, mechanism, ignored=()):
                              f'{mechanism.title} has {", ".join(mechanism.shafts)}')
         if names.count(name) > 1:
             raise ValueError(f'{path}:1: column {name!r}: it appears twice')
-    if not measured:
-        raise ValueError(f'{path}:1: no column has a measured speed, such as '
-                         f'{SPEED}{mechanism.outputs[0]}')
-    ports, clutches, others = mechanism.ports, mechanism.clutch_moments, [*measured, *ignored]
+    ports, clutches, others = mechanism.ports, mechanism.clutch_moments, measured
     if written:
         ports = [port._replace(name=TORQUE + port.name) for port in ports]
         clutches = [FORCE + name for name in mechanism.clutches]
-        known = {'time', *(port.name for port in ports), *clutches}
-        others = [name for name in names if name not in known] + list(ignored)
-    table = read_torque_file(path, ports, clutches, others)
+        # the other speeds were made of these two
+        measured = [name for name in measured if name.removeprefix(SPEED) in mechanism.outputs]
+    if written or not measured:   # what is wrong with the table itself comes first
+        known = {'time', *(port.name for port in ports), *clutches, *ignored}
+        others = [name for name in names if name not in known]
+    if not measured and set(names) & {'time', *(port.name for port in ports)}:
+        raise ValueError(f'{path}:1: no column has a measured speed, such as '
+                         f'{SPEED}{mechanism.outputs[0]}')
+    table = read_torque_file(path, ports, clutches, ignored, () if not measured else others)
     speeds = {name.removeprefix(SPEED): np.array(
         [_speed(path, line, name, row[names.index(name)]) for line, row in rows])
         for name in measured}

@@ -82,7 +82,7 @@ class HeldTorques:
         return self._torques[bisect_right(self._starts, tick) - 1]
 
 
-def read_torque_file(path, ports, clutches=(), ignored=()):
+def read_torque_file(path, ports, clutches=(), ignored=(), beside=()):
     """
     Return the ``TorqueTable`` of a CSV file.
 
@@ -94,23 +94,25 @@ def read_torque_file(path, ports, clutches=(), ignored=()):
     :param clutches: names of columns that may be there too, forces of at least 0; where one of
         them is, they follow the torques in each row of the table, all of them, 0 for the others.
     :param ignored: names of further columns, whose cells are not read.
+    :param beside: the same, of columns that may well be there.
     :raises ValueError: one line that names file, line and column.
     """
     try:
         # utf-8-sig: spreadsheets begin the file with a byte order mark
         with open(path, newline='', encoding='utf-8-sig') as file:
-            return _table(path, csv.reader(file, strict=True), ports, clutches, ignored)
+            return _table(path, csv.reader(file, strict=True), ports, clutches, ignored, beside)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{path}: not a text file in UTF-8') from None
 
 
-def _table(path, reader, ports, clutches, ignored):
+def _table(path, reader, ports, clutches, ignored, beside):
     inputs = [port.name for port in ports]
     try:
         rows = (row for row in reader if any(cell.strip() for cell in row))
-        header = _header(next(rows, ()), inputs, clutches, ignored)
+        header = _header(next(rows, ()), inputs, clutches, ignored, beside)
+        ignored = *ignored, *beside
         forces = clutches if set(clutches) & (set(header) - set(ignored)) else ()
         times, torques, begin = [], [], 0
         for row in rows:
@@ -139,7 +141,9 @@ def _table(path, reader, ports, clutches, ignored):
     return TorqueTable(tuple(times), tuple(torques), idle, float(begin))
 
 
-def _header(row, inputs, clutches, ignored):
+def _header(row, inputs, clutches, ignored, beside):
+    if not row:
+        raise ValueError('the file is empty')
     names = [cell.strip() for cell in row]
     needed = ('time', *inputs)
     known = ', '.join((*needed, *(f'{name} (if wanted)' for name in clutches)))
@@ -149,10 +153,10 @@ def _header(row, inputs, clutches, ignored):
         if name not in names:
             raise ValueError(f'column {name!r}: it is not there to be ignored')
     for index, name in enumerate(names):
-        if name in ignored:
+        if name in ignored or name in beside:
             continue
         if name not in (*needed, *clutches):
-            hint = table_hints.of_header(names, needed, clutches)
+            hint = table_hints.of_header(names, needed, (*clutches, *beside))
             raise ValueError(f'column {name!r}: unknown, the columns are {known}{hint}')
         if name in names[:index]:
             raise ValueError(f'column {name!r}: it appears twice')

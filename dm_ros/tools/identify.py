@@ -18,7 +18,7 @@ from dm_ros.files.recorded_drive import is_bag
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
 from dm_ros.settings import known_rows, make_simulation, NodeParameters
-from dm_ros.tools.identification.fit import fit, parameter
+from dm_ros.tools.identification.fit import fit, parameter, within_reach
 from dm_ros.tools.identification.picture import draw
 from dm_ros.tools.identification.report import as_data, as_parameter_file, as_text
 from dm_ros.tools.identification.runs import Runs
@@ -117,8 +117,9 @@ def parameters_of(words, simulation, values, drive):
             raise ValueError(f'--fit: {name}: the forces of the drive are those in force, behind '
                              'the actuators')
         try:
-            found.append(parameter(name, known_rows()[name], starts[name],
-                                   _limits(text) if equals else None))
+            found.append(within_reach(
+                parameter(name, known_rows()[name], starts[name],
+                          _limits(text) if equals else None), simulation.parameters))
         except ValueError as error:
             raise ValueError(f'--fit: {error}') from None
     return found
@@ -152,6 +153,8 @@ def run(arguments):
     simulation = make_simulation(variant, all_values, dt)
     parameters = parameters_of(arguments.fit, simulation, all_values, drive)
     fitted = {p.name for p in parameters}
+    if make_simulation(variant, values).dt != dt:
+        values['rate'] = 1 / dt   # so that what is written runs as the fit did
     try:
         found = fit(Runs(variant, all_values, drive, dt), parameters)
     except ValueError as error:

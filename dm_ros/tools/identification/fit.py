@@ -20,6 +20,7 @@ PRECISION = 1e-6   # relative, of parameters, at which a fit is at its end
 GAIN = 1e-3        # likewise, of half the sum of squares, which a standard error raises by 1/2
 FLAT = 1e-15       # slope of the sum of squares, where nothing matters
 MOST_STEPS = 100   # of a fit with given noise
+INSIDE = 0.99      # of the way to an impossible mechanism, to where a range may reach
 MOST_FITS = 5      # each with the noise that the one before left
 SAME_NOISE = 0.05  # relative
 
@@ -81,6 +82,33 @@ def parameter(name, entry, start, limits=None):
     is_log = (entry.low > 0.0 or entry.low == 0.0 and entry.above_low) and (
         entry.high > 1.0 and entry.high >= MANYFOLD * entry.low)
     return Parameter(name, entry.unit, start, low, high, is_log, abs(start) or high - low)
+
+
+def within_reach(p, table):
+    """
+    Return a ``Parameter`` whose range ends where the table makes an impossible mechanism.
+
+    Such as by a clutch that locks itself, with all others at the start: a fit follows a limit,
+    and is lost at a wall that it does not know.
+    """
+    def is_possible(value):
+        try:
+            table.changed({p.name: value})
+        except ValueError:
+            return False
+        return True
+
+    def reach(end):
+        if is_possible(end):
+            return end
+        good, bad = p.start, end
+        for _ in range(60):
+            middle = (good + bad) / 2
+            good, bad = (middle, bad) if is_possible(middle) else (good, middle)
+        return p.start + INSIDE * (good - p.start)
+    if not table.part_of({p.name: p.start}):   # a speed at the start
+        return p
+    return p._replace(low=reach(p.low), high=reach(p.high))
 
 
 class Fit(NamedTuple):
