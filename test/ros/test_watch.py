@@ -11,6 +11,7 @@ import re
 import signal
 import socket
 import threading
+import time
 
 from processes import command, Forked
 import pytest
@@ -20,6 +21,7 @@ from sensor_msgs.msg import JointState
 
 from dm_ros.mechanism.variants import MECHANISMS
 from dm_ros.ros.messages import LOCKSTEP_OUTPUT_QOS
+from dm_ros.watch.ticks import LONGEST_GAP
 
 
 class Page:
@@ -265,6 +267,8 @@ def test_pause_step_and_continue(ros, page):
         200, {'success': False, 'message': 'only while paused, see ~/pause'})
     assert ask(ros, it, do='pause') == (200, {'success': True, 'message': 'paused'})
     ros.until(lambda: any(status['message'] == 'paused' for status in it.last['diagnostics']))
+    paused = time.monotonic()
+    ros.until(lambda: time.monotonic() - paused > 2 * LONGEST_GAP)
     ticks = node.plant.ticks
     assert ask(ros, it, do='step')[1]['success'] and node.plant.ticks == ticks + 1
     position = node.simulation.snapshot().position
