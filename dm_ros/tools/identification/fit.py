@@ -108,7 +108,7 @@ def within_reach(p, table):
         return p.start + INSIDE * (good - p.start)
     if not table.part_of({p.name: p.start}):   # a speed at the start
         return p
-    return p._replace(low=reach(p.low), high=reach(p.high))
+    return Parameter(p.name, p.unit, p.start, reach(p.low), reach(p.high), p.is_log, p.scale)
 
 
 class Fit(NamedTuple):
