@@ -17,9 +17,10 @@ In direct flow v_k = 1/eta_kG, c = d = 1/eta_0B, b = 1 and N_k is the paper's M_
 v_k = eta_kG, c = 1, b = d = 1/eta_0B and -Z_k is. Its M_F is C/eta_FG and -C.
 """
 
+from math import isfinite
 from typing import NamedTuple
 
-from dm_ros.mechanism.power_flow import DIRECT
+from dm_ros.mechanism.power_flow import DIRECT, REVERSE
 
 
 class Rows(NamedTuple):
@@ -78,3 +79,12 @@ def rows(p, k, direction):
         for e, h, p, q, f in zip(carrier, satellite, shaft_1, shaft_2, final_drive)]
     return Rows(e_0, e_s, tuple([u_1 * z for z in Z_1]), tuple([u_2 * z for z in Z_2]),
                 tuple([u_F * z if g_F else 0.0 for z in C]))
+
+
+def is_finite(p, k):
+    """Return whether all ``Rows`` of both directions are finite; see ``rows``."""
+    try:
+        return all(isfinite(value) for direction in (DIRECT, REVERSE)
+                   for row in rows(p, k, direction) for value in row)
+    except ZeroDivisionError:
+        return False

@@ -19,7 +19,7 @@ between: what is ``Exact`` of an exact step, or ``(u, parts)`` of ``adaptive.ste
 
 import numpy as np
 
-from dm_ros.mechanism import clutched, losses, passive, symmetric
+from dm_ros.mechanism import clutched, elimination, losses, passive, symmetric
 from dm_ros.mechanism.kinetic import kinetic_form
 from dm_ros.mechanism.power_flow import DIRECT, power_flow, REVERSE, who_drives
 from dm_ros.mechanism.variants import SYMMETRIC
@@ -203,9 +203,8 @@ class PassiveModel(Model):
         super().__init__(parameters, h, clutches)
         self.clutches = clutches
         self.lagged = getattr(formulation, 'lagged', False)
-        responses_of(formulation, parameters)   # refuses what overflows
         self.k = passive.coefficients(parameters, clutches, not self.lagged)
-        if not passive.has_solutions(self.k):
+        if not (elimination.is_finite(parameters, self.k) and passive.has_solutions(self.k)):
             raise no_solution(parameters)
         self.tolerance = adaptive.TOLERANCE / 5   # signs that turn round make kinks
 
