@@ -127,8 +127,9 @@ def couplings():
         return lambda rate, ticks: grows_by_torque(late(load, ticks), rate, attached(inertia))
 
     def by_speed(stiffness, inner, slope):
+        seconds = 2.0 * (1e3 / stiffness)**0.5   # stiffer shafts swing faster
         return lambda rate, ticks: grows((stiffness, 100.0), rate, inner, ticks, slope,
-                                          seconds=2.0)
+                                         seconds=seconds)
     result = {
         'torque port, light gears': by_torque(tyre(SLOPE), 0.0),
         'torque port, the wheel attached to the shaft': by_torque(tyre(SLOPE), INERTIA),
