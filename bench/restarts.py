@@ -119,7 +119,7 @@ def row(transport, restarts, folder, rate):
             f'{publish.max() / 1e6:.1f}', len(blocked), dead.sum(),
             (ticks[:, 1] * 1e-9 * rate).astype(int).sum(), f'{100 * cpu:.1f} %',
             *([f'{1e3 * q:.2f}' for q in np.quantile(trips, [0.5, 0.99])]
-              if len(trips) else '--')]   # over before the first one
+              if len(trips) else ['-', '-'])]   # over before the first one
 
 
 def main():
