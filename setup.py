@@ -29,8 +29,9 @@ setup(
     ],
     package_data={NAME: ['ros/*.xml', 'sources/**/*', 'watch/web/*', 'watch/web/uplot/*']},
     ext_modules=[Extension(   # never required: without a compiler Python does it all
-        f'{NAME}._core', sorted(glob('core/*.c')), depends=glob('core/*.h'), optional=True,
-        py_limited_api=True, extra_compile_args=[   # equal bits: no fused multiply-add
+        f'{NAME}._core', sorted(glob('core/*.c') + glob('core/ensemble/*.c')),
+        depends=glob('core/**/*.h', recursive=True), optional=True, py_limited_api=True,
+        extra_compile_args=[   # equal bits: no fused multiply-add
             '-std=c99', '-O3', '-ffp-contract=off', '-fno-math-errno', '-fno-trapping-math',
             '-fvisibility=hidden'])],
     zip_safe=False,   # Fast DDS reads localhost.xml itself

@@ -5,22 +5,29 @@
  */
 
 #include "exponentials.h"
+#include "real.h"
 
-static const double BACKWARD = 3.0, SAFETY = 0.8, SHRINK = 0.1, GROW = 5.0;
-enum { MOST_RESORTS = 1000 };
+#define EVALUATE job->law->evaluate
+#define JACOBIAN job->law->jacobian
+#define BENDS job->law->bends
+#define APPLY_PHI_2 dm_apply_phi_2
 
-/* Return h (3 I - |h| J)^-1 (f(there) - f(here) - J d) of two points that are d apart. */
-static pair nonlinear_part(step *job, const point *here, const point *there, matrix J, double h,
-                           double d_w, double d_s)
+/* The one step of a job is watched always. */
+static int watched(const step *job)
 {
-    const double D_w = h * (there->e_0 - here->e_0 - J.ww * d_w - J.ws * d_s);
-    const double D_s = h * (there->e_s - here->e_s - J.sw * d_w - J.ss * d_s);
-    const double k = fabs(h);
-    const double a = 3 - k * J.ww, b = k * J.ws, c = k * J.sw, d = 3 - k * J.ss;
-    const double det = a * d - b * c;
-    return (pair){quotient(job, d * D_w + b * D_s, det),
-                  quotient(job, c * D_w + a * D_s, det)};
+    (void)job;
+    return 1;
 }
+
+static int watch(const step *job, int which)
+{
+    (void)job;
+    return which;
+}
+
+#include "part_equations.h"
+
+enum { MOST_RESORTS = 1000 };
 
 /* Book a part of the path; the first one is what it is, the others are added. */
 static void book(step *job, int is_first, const part *path)
@@ -47,43 +54,22 @@ int dm_advance(step *job, pair y)
         here = &job->points[0];
     }
     point *there = &job->points[here == &job->points[0]];
-    slopes at_start = law->jacobian(job, here), at_end = at_start;
+    slopes at_start = law->jacobian(job, here);
+    trial found;
     for (int n = 0; n < law->most_trials; n++) {
-        const matrix J = at_start.J;
-        const double f_w = here->e_0, f_s = here->e_s;
-        const double z_ww = h * J.ww, z_ws = h * J.ws, z_sw = h * J.sw, z_ss = h * J.ss;
-        const pair v = dm_apply_phi_2(job, z_ww, z_ws, z_sw, z_ss, f_w, f_s);
-        const double d_w = h * (f_w + z_ww * v.w + z_ws * v.s);
-        const double d_s = h * (f_s + z_sw * v.w + z_ss * v.s);
-        law->evaluate(job, w + d_w, s + d_s, there);
-        double i_w = h * (w + h * v.w), i_s = h * (s + h * v.s);
-        const pair c = nonlinear_part(job, here, there, J, h, d_w, d_s);
-        const double allowed = job->tolerance + law->relative * (fabs(d_w) + fabs(d_s));
-        double error = quotient(job, fabs(c.w) + fabs(c.s), allowed);
-        int is_known = 0;
-        if (error <= 1.0) {
-            law->evaluate(job, w + d_w + c.w, s + d_s + c.s, there);
-            if (law->bends(job, here, there)) {
-                at_end = law->jacobian(job, there);
-                is_known = 1;
-                const pair r = nonlinear_part(job, there, here, at_end.J, -h, -d_w - c.w,
-                                              -d_s - c.s);
-                const double seen = quotient(job, fabs(r.w) + fabs(r.s), BACKWARD * allowed);
-                if (seen > error)
-                    error = seen;
-            }
-        }
+        try_part(job, here, at_start.J, w, s, h, law->relative, there, &found);
         if (job->broken)
             return -1;
+        const double error = found.error;
         if (error <= 1.0) {
-            i_w += h * c.w / 4;
-            i_s += h * c.s / 4;
-            book(job, !booked++, &(part){{w, s}, {f_w, f_s}, at_start, h, {d_w, d_s}, c,
-                                         {i_w, i_s}, 0, here, there});
-            angle_w += i_w;
-            angle_s += i_s;
-            w = w + d_w + c.w;
-            s = s + d_s + c.s;
+            const pair d = found.d, c = found.c, i = {found.integral.w + h * c.w / 4,
+                                                      found.integral.s + h * c.s / 4};
+            book(job, !booked++, &(part){{w, s}, {here->e_0, here->e_s}, at_start, h, d, c, i, 0,
+                                         here, there});
+            angle_w += i.w;
+            angle_s += i.s;
+            w = w + d.w + c.w;
+            s = s + d.s + c.s;
             left -= h;
             if (left <= 0.0) {
                 job->end = (pair){w, s};
@@ -91,7 +77,7 @@ int dm_advance(step *job, pair y)
                 job->at_end = there;
                 return job->broken ? -1 : 0;
             }
-            at_start = is_known ? at_end : law->jacobian(job, there);
+            at_start = found.has_slopes ? found.at_end : law->jacobian(job, there);
             here = there;
             there = &job->points[here == &job->points[0]];
         }

@@ -10,36 +10,19 @@
 
 #include <math.h>
 
-enum { HELD = 6, STATE = 7, SOLVED = 17, LOST = 8 };
+enum { HELD = 6, STATE = 7, SOLVED = 17, LOST = 8, KEPT = 8 };
 
-typedef struct {
-    double w, s;
-} pair;
-
-typedef struct {
-    double ww, ws, sw, ss;
-} matrix;
+#define REAL double
+#define OF(name) name
+#include "types.h"
+#undef REAL
+#undef OF
 
 /* The Jacobian of the motion, and under the paper's law that of the friction: 1w, 1s, 2w, 2s. */
 typedef struct {
     matrix J;
     double F[4];
 } slopes;
-
-typedef struct {
-    double s_1, s_2, s_F, h_N, b;
-} signs;
-
-/*
- * All that is known of one state. Under the passive law signs, state and solved are those of
- * passive.py; under the paper's law state begins with t_1, t_2, x_1, x_2 of clutched.py.
- */
-typedef struct {
-    double e_0, e_s, F_1, F_2, M_1, M_2, M_F;
-    signs sign;
-    double state[STATE];
-    double solved[SOLVED];
-} point;
 
 /* A part of the path of a step, see adaptive.step. */
 typedef struct {

@@ -7,6 +7,9 @@
 #include <string.h>
 
 #include "differential.h"
+#include "real.h"
+
+#include "shafts_equations.h"
 
 int dm_shafts(const model *m)
 {
@@ -39,12 +42,7 @@ static void at_ports(const model *m, const double *x, double *speeds)
 /* Put the speeds of all shafts into speeds, from x, or their angles. */
 static void all_shafts(const model *m, const double *x, double *speeds)
 {
-    const double spin = (0.0 - x[1]) * m->k_2 / m->g_2s;
-    speeds[0] = x[0];
-    speeds[1] = x[0] + m->k_1 * x[1];
-    speeds[2] = x[0] - m->k_2 * x[1];
-    speeds[3] = m->g_F != 0.0 ? m->g_F * x[0] : spin;
-    speeds[4] = spin;
+    speeds_of(m->g_F, m->k_1, m->k_2, m->g_2s, x, speeds);
 }
 
 static void positions(const model *m, const state *now, double *angles)
@@ -83,11 +81,9 @@ void dm_adopt(const model *before, const model *after, state *now)
 static double flow_of(const model *m, const double *x, const double *T, double last)
 {
     const double deadband = m->run.deadband;
+    if (m->run.is_passive != 0.0)
+        return flow_of_input(T[0], m->g_F, x[0], m->sign_speed, deadband, last);
     const double power = T[0] * (m->g_F != 0.0 ? m->g_F : 1.0) * x[0];
-    if (m->run.is_passive != 0.0) {
-        const int turning = fabs(x[0]) > m->sign_speed;
-        return turning && power > deadband ? 1.0 : turning && power < -deadband ? -1.0 : last;
-    }
     double speeds[PORTS];
     at_ports(m, x, speeds);
     const double output = T[1] * speeds[1] + T[2] * speeds[2];
@@ -104,7 +100,7 @@ static void friction(const model *m, const double *memory, const double *force, 
 {
     const int pressed = force[0] != 0.0 || force[1] != 0.0;
     for (int n = 0; n < CLUTCHES; n++) {
-        S[n] = pressed ? m->preload[n] + m->f[n] * force[n] * m->radius[n] : m->preload[n];
+        S[n] = pressed_friction(pressed, m->preload[n], m->f[n], force[n], m->radius[n]);
         if (m->run.is_lagged != 0.0)
             S[n] = m->phi[n] * memory[n] + S[n];
     }
@@ -315,11 +311,8 @@ int dm_tick(const model *m, state *now, patterns *known, const double *T, const 
     double flow = now->flow, coarse_steps = now->coarse_steps, S[CLUTCHES], tick[ENTRIES];
     const double *seen = now->seen;
     if (m->run.has_clutches != 0.0 && commands) {
-        for (int n = 0; n < CLUTCHES; n++) {
-            const double command = m->limit[n] < commands[n] ? m->limit[n] : commands[n];
-            force[n] = m->rise[n] == 1.0 ? command
-                                         : force[n] + (command - force[n]) * m->rise[n];
-        }
+        for (int n = 0; n < CLUTCHES; n++)
+            force[n] = force_after(force[n], commands[n], m->limit[n], m->rise[n]);
     }
     const int lagged = m->run.is_lagged != 0.0, substeps = (int)m->run.substeps;
     if (lagged && find(m, now, known, &did))

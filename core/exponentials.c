@@ -5,20 +5,13 @@
  */
 
 #include "exponentials.h"
+#include "real.h"
 
-static const double STEEPEST = 300.0, SMALL = 0.02, APART = 1e-4;
+#include "exponentials_equations.h"
 
 static double bounded(double z)
 {
     return STEEPEST < z ? STEEPEST : z;
-}
-
-static double phi_2(step *job, double z)
-{
-    if (fabs(z) < SMALL)
-        return (1.0 / 2 + z * (1.0 / 6 + z * (1.0 / 24 + z * (1.0 / 120 + z * (
-            1.0 / 720 + z / 5040)))));
-    return quotient(job, expm1(bounded(z)) - z, z * z);
 }
 
 /* Return phi_2 of a + ib, b > 0, as a real and an imaginary part. */
@@ -49,17 +42,16 @@ pair dm_apply_phi_2(step *job, double z_11, double z_12, double z_21, double z_2
     const double mean = (z_11 + z_22) / 2, half = (z_11 - z_22) / 2;
     const double square = half * half + z_12 * z_21;
     const double root = sqrt(fabs(square));
-    double center, value, slope;
+    if (!(square < 0.0) && root > APART)
+        return of_two_modes(job, mean, root, z_11, z_12, z_21, z_22, v_1, v_2);
+    double center = mean + root, value, slope = 0.0;
     if (square < 0.0) {
         const pair turning = complex_phi_2(job, mean, root);
         center = mean;
         value = turning.w;
         slope = quotient(job, turning.s, root);
     } else {
-        center = mean + root;
         value = phi_2(job, center);
-        const double low = mean - root;
-        slope = root > APART ? (value - phi_2(job, low)) / (2 * root) : 0.0;
     }
     if (!(root > APART))
         slope = (phi_2(job, mean + 1e-3) - phi_2(job, mean - 1e-3)) / 2e-3;

@@ -7,6 +7,9 @@
 #include "exponentials.h"
 #include "linear.h"
 #include "quadrature.h"
+#include "real.h"
+
+#include "exact_equations.h"
 
 /* A 2x2 matrix, (11, 12, 21, 22). */
 typedef struct {
@@ -106,12 +109,12 @@ static int make_second(double *second, const response *r, double h)
 
 int dm_make_linear(linear *made, const response *r, const losses_without_clutches *lost, double h)
 {
-    make_step(made->step, r, h);
+    make_step(made->map.step, r, h);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 2; j++)
-            made->moments[i][j] = r->P[i][j];
+            made->map.moments[i][j] = r->P[i][j];
         for (int j = 0; j < 3; j++)
-            made->moments[i][2 + j] = r->Q[i][j];
+            made->map.moments[i][2 + j] = r->Q[i][j];
     }
     made->lost = *lost;
     return make_second(made->second, r, h);
@@ -119,21 +122,13 @@ int dm_make_linear(linear *made, const response *r, const losses_without_clutche
 
 void dm_exact_step(const linear *exact, pair x, const double *T, pair *end, pair *integral)
 {
-    double found[4];
-    for (int n = 0; n < 4; n++) {
-        const double *row = exact->step[n];
-        found[n] = row[0] * x.w + row[1] * x.s + row[2] * T[0] + row[3] * T[1] + row[4] * T[2];
-    }
-    *end = (pair){found[0], found[1]};
-    *integral = (pair){found[2], found[3]};
+    exact_step(&exact->map, x, T, end, integral);
 }
 
 void dm_exact_moments(const linear *exact, pair x, const double *T, double *moments)
 {
-    for (int n = 0; n < 3; n++) {
-        const double *row = exact->moments[n];
-        moments[n] = row[0] * x.w + row[1] * x.s + row[2] * T[0] + row[3] * T[1] + row[4] * T[2];
-    }
+    for (int n = 0; n < 3; n++)
+        moments[n] = response_to(exact->map.moments[n], x, T);
 }
 
 void dm_exact_book(const linear *exact, double g_F, double h, pair x, pair end, pair integral,
@@ -149,11 +144,11 @@ void dm_exact_book(const linear *exact, double g_F, double h, pair x, pair end, 
     const double X_ss = s * (a_s + b_s) + k[6] * d_ww + k[7] * d_ws + k[8] * d_ss;
     double M[3], M_w[3];   /* the moments of the torques, and their products with w */
     for (int n = 0; n < 3; n++) {
-        const double *row = exact->moments[n];
+        const double *row = exact->map.moments[n];
         M[n] = row[2] * T[0] + row[3] * T[1] + row[4] * T[2];
         M_w[n] = row[0] * X_ww + row[1] * X_ws + M[n] * a_w;
     }
-    const double *M_1 = exact->moments[1], *M_2 = exact->moments[2];
+    const double *M_1 = exact->map.moments[1], *M_2 = exact->map.moments[2];
     const double T_3_w3 = T[0] * g_F * a_w;
     const losses_without_clutches *q = &exact->lost;
     lost[0] = q->drag_w * X_ww + q->drag_s * X_ss;

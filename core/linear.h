@@ -23,8 +23,7 @@ typedef struct {
 
 /* What is exact for one response and one length of step. */
 typedef struct {
-    double step[4][5];   /* rows of w and s, then of their integrals; of (w, s, T_3, T_1, T_2) */
-    double moments[3][5];
+    exact map;
     losses_without_clutches lost;
     double second[9];    /* of quadrature.second_moment_of_the_way */
 } linear;
@@ -32,7 +31,7 @@ typedef struct {
 /* An exact step of the passive law, and what must hold on its way. */
 typedef struct {
     linear exact;
-    double slope[2][5], kept[8][6], input_sign, reach[2];
+    way way;
     int key, is_none;    /* none: these signs have no exact step */
 } pattern;
 
@@ -55,8 +54,11 @@ void dm_exact_moments(const linear *, pair x, const double *T, double *moments);
 void dm_exact_book(const linear *, double g_F, double h, pair x, pair end, pair integral,
                    const double *T, double *work, double *lost);
 
-/* Return whether the carrier and the outputs are so fast that every sigma is 1 or -1. */
+/* Return whether a state is so fast that every sigma is 1 or -1, which exact steps take. */
 int dm_has_pattern(const coefficients *, pair x);
+
+/* Return the number of the signs at a point, and of that of the input torque; 0 is none. */
+int dm_key_of(const point *, double T_in);
 
 /* Return the pattern at a point where all is fast, NULL where there is none. */
 const pattern *dm_pattern_at(patterns *known, const coefficients *, double h, double T_in,

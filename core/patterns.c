@@ -9,15 +9,15 @@
 
 #include "linear.h"
 
-static const double MARGIN = 1e-9, SATURATED = 20.0;
-enum { KEPT = 8 };
+#include "real.h"
+
+#include "exact_equations.h"
+
+static const double MARGIN = 1e-9;
 
 int dm_has_pattern(const coefficients *k, pair x)
 {
-    const double w = x.w, k_1s = k->k_1 * x.s, k_2s = k->k_2 * x.s;
-    const double fast = SATURATED * k->sign_speed;
-    return (w > fast || w < -fast) && (w + k_1s > fast || w + k_1s < -fast)
-        && (w - k_2s > fast || w - k_2s < -fast);
+    return is_fast(k, x);
 }
 
 /* Put the largest share into share; return 0 where a number is divided by zero. */
@@ -76,7 +76,7 @@ static int make(pattern *made, const coefficients *k, double h, const point *at,
     const matrix J = job.law->jacobian(&job, at).J;
     response r = {.A = {{J.ww + 0.0, J.ws + 0.0}, {J.sw + 0.0, J.ss + 0.0}}};
     job.law->torque_slopes(&job, at, r.B[0], r.B[1]);
-    double (*e)[5] = made->slope, M[3][5], N[5], bracket[5];
+    double (*e)[5] = made->way.slope, M[3][5], N[5], bracket[5];
     for (int n = 0; n < 2; n++) {
         for (int j = 0; j < 2; j++)
             e[n][j] = r.A[n][j];
@@ -112,14 +112,14 @@ static int make(pattern *made, const coefficients *k, double h, const point *at,
     const double *moments[5] = {M[0], M[1], M[2], N, bracket};
     for (int n = 0; n < KEPT; n++) {
         for (int j = 0; j < 6; j++)
-            made->kept[n][j] = n < 3 ? speeds[n][j] : j < 5 ? sign[n - 3] * moments[n - 3][j]
+            made->way.kept[n][j] = n < 3 ? speeds[n][j] : j < 5 ? sign[n - 3] * moments[n - 3][j]
                                                             : MARGIN;
     }
-    if (job.broken || !reach_of_slopes(r.A, h, made->reach))
+    if (job.broken || !reach_of_slopes(r.A, h, made->way.reach))
         return 0;
     for (int n = 0; n < KEPT; n++)
         for (int j = 0; j < 6; j++)
-            if (!isfinite(made->kept[n][j]))
+            if (!isfinite(made->way.kept[n][j]))
                 return 0;
     for (int n = 0; n < 2; n++)
         for (int j = 0; j < 5; j++)
@@ -141,20 +141,25 @@ static int make(pattern *made, const coefficients *k, double h, const point *at,
         2 * k->half_2 * s_2 * sigma_2,
         bearing_3 * drives * n_F, -bearing_3 * input_brakes, bearing_3,
         bearing_0 * h_N * n_1, bearing_0 * h_N * n_2, -bearing_0 * brakes * c_F, bearing_0};
-    made->input_sign = input_sign;
+    made->way.input_sign = input_sign;
     return dm_make_linear(&made->exact, &r, &lost, h);
+}
+
+int dm_key_of(const point *at, double T_in)
+{
+    const signs *s = &at->sign;
+    const double bits[9] = {at->state[2], at->state[3], at->state[4], s->s_1, s->s_2, s->s_F,
+                            s->h_N, s->b, T_in >= 0.0 ? 1.0 : -1.0};
+    int key = 1;
+    for (int n = 0; n < 9; n++)
+        key = 2 * key + (bits[n] > 0.0);
+    return key;
 }
 
 const pattern *dm_pattern_at(patterns *known, const coefficients *k, double h, double T_in,
                              const point *at)
 {
-    const double input_sign = T_in >= 0.0 ? 1.0 : -1.0;
-    const signs *s = &at->sign;
-    const double bits[9] = {at->state[2], at->state[3], at->state[4], s->s_1, s->s_2, s->s_F,
-                            s->h_N, s->b, input_sign};
-    int key = 1;   /* 0 is none */
-    for (int n = 0; n < 9; n++)
-        key = 2 * key + (bits[n] > 0.0);
+    const int key = dm_key_of(at, T_in);
     for (int n = 0; n < known->met; n++)
         if (known->kept[n].key == key) {
             known->last = n;
@@ -166,33 +171,12 @@ const pattern *dm_pattern_at(patterns *known, const coefficients *k, double h, d
     known->last = place;
     pattern *made = &known->kept[place];
     made->key = key;
-    made->is_none = !make(made, k, h, at, input_sign);
+    made->is_none = !make(made, k, h, at, T_in >= 0.0 ? 1.0 : -1.0);
     return made->is_none ? NULL : made;
 }
 
 int dm_pattern_step(const pattern *p, pair x, const double *T, pair *end, pair *integral)
 {
-    if (T[0] * p->input_sign < 0.0)
-        return 0;
     dm_exact_step(&p->exact, x, T, end, integral);
-    const double *a = p->slope[0], *b = p->slope[1];
-    const double b_w = a[2] * T[0] + a[3] * T[1] + a[4] * T[2];
-    const double b_s = b[2] * T[0] + b[3] * T[1] + b[4] * T[2];
-    const double v_w = a[0] * x.w + a[1] * x.s + b_w, v_s = b[0] * x.w + b[1] * x.s + b_s;
-    const double v_w_end = a[0] * end->w + a[1] * end->s + b_w;
-    const double v_s_end = b[0] * end->w + b[1] * end->s + b_s;
-    for (int n = 0; n < KEPT; n++) {
-        const double *c = p->kept[n];
-        const double held = c[2] * T[0] + c[3] * T[1] + c[4] * T[2] - c[5];
-        const double f = c[0] * x.w + c[1] * x.s + held;
-        const double f_end = c[0] * end->w + c[1] * end->s + held;
-        if (f <= 0.0 || f_end <= 0.0)
-            return 0;
-        const double slope = c[0] * v_w + c[1] * v_s;
-        const double slope_end = c[0] * v_w_end + c[1] * v_s_end;
-        const double down = p->reach[0] * fabs(slope) + p->reach[1] * fabs(slope_end);
-        if (slope * slope_end < 0.0 && (f < f_end ? f : f_end) <= down)
-            return 0;
-    }
-    return 1;
+    return holds(&p->way, x, T, *end);
 }

@@ -5,11 +5,11 @@
  * one after the other in memory that Python owns, and are stepped with the interpreter free.
  */
 
-#include "python.h"
+#include "../python.h"
 
 #include <string.h>
 
-#include "differential.h"
+#include "../differential.h"
 
 enum { ROOM = 2 };   /* patterns of signs that are kept */
 

@@ -1,0 +1,46 @@
+/* Copyright 2026 dm_ros developers
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * What the equations are about, made of REAL: see real.h.
+ */
+
+typedef struct {
+    REAL w, s;
+} OF(pair);
+
+typedef struct {
+    REAL ww, ws, sw, ss;
+} OF(matrix);
+
+typedef struct {
+    REAL s_1, s_2, s_F, h_N, b;
+} OF(signs);
+
+/*
+ * All that is known of one state. Under the passive law signs, state and solved are those of
+ * passive.py; under the paper's law state begins with t_1, t_2, x_1, x_2 of clutched.py.
+ */
+typedef struct {
+    REAL e_0, e_s, F_1, F_2, M_1, M_2, M_F;
+    OF(signs) sign;
+    REAL state[STATE];
+    REAL solved[SOLVED];
+} OF(point);
+
+/* What does not change while the parameters stay, in the order of passive.Coefficients. */
+typedef struct {
+    REAL sign_speed, g_12, k_1, k_2, g_F, I_0, I_1, I_2, I_3, I_s, l_0, l_1, l_2, l_3, l_s;
+    REAL mean_1, mean_2, mean_F, half_1, half_2, half_F, bearing_0, bearing_3;
+    REAL a_1, a_2, phi_1, phi_2, psi_1, psi_2;
+} OF(coefficients);
+
+/* What is exact for one response and one length of step. */
+typedef struct {
+    REAL step[4][5];      /* rows of w and s, then of their integrals; of (w, s, T_3, T_1, T_2) */
+    REAL moments[3][5];
+} OF(exact);
+
+/* What must hold on the way of an exact step under the passive law. */
+typedef struct {
+    REAL slope[2][5], kept[KEPT][6], input_sign, reach[2];
+} OF(way);
