@@ -11,6 +11,7 @@
 #include <math.h>
 
 enum { HELD = 6, STATE = 7, SOLVED = 17, LOST = 8, KEPT = 8 };
+enum { SHAFTS = 5, PORTS = 3, MOMENTS = 5, CLUTCHES = 2 };   /* at most */
 
 #define REAL double
 #define OF(name) name

@@ -13,8 +13,6 @@
 #include "linear.h"
 #include "passive.h"
 
-enum { SHAFTS = 5, PORTS = 3, MOMENTS = 5, CLUTCHES = 2 };   /* at most */
-
 enum { SYMMETRIC = 37, SELF_LOCKING = 33 };   /* parameters of each mechanism */
 
 /* What a run has beside its parameters; all numbers, as Python packs them. */
@@ -45,14 +43,6 @@ typedef struct {
         linear exact[2];                       /* paper's law without clutches, by flow */
     } law;
 } model;
-
-/* All that goes on from tick to tick, as in motion/state.py. */
-typedef struct {
-    double x[2], turned[2], origin[SHAFTS], torque[PORTS], flow, memory[CLUTCHES];
-    double force[CLUTCHES], held[PORTS];
-    double ticks, coarse_steps;
-    double seen[STATE];   /* of the last point of the passive law: what need not be found again */
-} state;
 
 /* What a differential reports at the end of a tick, as state.Snapshot. */
 typedef struct {

@@ -28,6 +28,19 @@ static inline MASK is_fast(const OF(coefficients) *k, OF(pair) x)
         & ((w - k_2s > fast) | (w - k_2s < -fast));
 }
 
+/* Return the number of the signs at a point, and of that of the input torque; 0 is none. */
+static inline MASK number_of_signs(const OF(point) *at, REAL T_in)
+{
+    const OF(signs) *s = &at->sign;
+    const REAL numbers[] = {at->state[2], at->state[3], at->state[4], s->s_1, s->s_2, s->s_F,
+                            s->h_N, s->b};
+    MASK key = no_mask();
+    key = with_digit(key, opposite(key));
+    for (int n = 0; n < 8; n++)
+        key = with_digit(key, numbers[n] > 0.0);
+    return with_digit(key, T_in >= 0.0);
+}
+
 /* Return where every sign holds on the way of a step. */
 static inline MASK holds(const OF(way) *p, OF(pair) x, const REAL *T, OF(pair) end)
 {

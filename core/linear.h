@@ -57,9 +57,6 @@ void dm_exact_book(const linear *, double g_F, double h, pair x, pair end, pair 
 /* Return whether a state is so fast that every sigma is 1 or -1, which exact steps take. */
 int dm_has_pattern(const coefficients *, pair x);
 
-/* Return the number of the signs at a point, and of that of the input torque; 0 is none. */
-int dm_key_of(const point *, double T_in);
-
 /* Return the pattern at a point where all is fast, NULL where there is none. */
 const pattern *dm_pattern_at(patterns *known, const coefficients *, double h, double T_in,
                              const point *);

@@ -145,21 +145,10 @@ static int make(pattern *made, const coefficients *k, double h, const point *at,
     return dm_make_linear(&made->exact, &r, &lost, h);
 }
 
-int dm_key_of(const point *at, double T_in)
-{
-    const signs *s = &at->sign;
-    const double bits[9] = {at->state[2], at->state[3], at->state[4], s->s_1, s->s_2, s->s_F,
-                            s->h_N, s->b, T_in >= 0.0 ? 1.0 : -1.0};
-    int key = 1;
-    for (int n = 0; n < 9; n++)
-        key = 2 * key + (bits[n] > 0.0);
-    return key;
-}
-
 const pattern *dm_pattern_at(patterns *known, const coefficients *k, double h, double T_in,
                              const point *at)
 {
-    const int key = dm_key_of(at, T_in);
+    const int key = number_of_signs(at, T_in);
     for (int n = 0; n < known->met; n++)
         if (known->kept[n].key == key) {
             known->last = n;

@@ -29,15 +29,25 @@ static inline REAL pick(MASK which, REAL yes, REAL no)
 
 static inline int any(MASK which)
 {
+#ifdef SIGNS_OF
+    return SIGNS_OF(which) != 0;   /* in one instruction */
+#else
     long long found = 0;
     for (int n = 0; n < LANES; n++)
         found |= which[n];
     return found != 0;
+#endif
 }
 
 static inline MASK opposite(MASK which)
 {
     return ~which;
+}
+
+/* Append a binary digit to each number. */
+static inline MASK with_digit(MASK number, MASK digit)
+{
+    return 2 * number - digit;
 }
 
 static inline REAL absolute(REAL x)
@@ -104,6 +114,11 @@ static inline int any(int which)
 static inline int opposite(int which)
 {
     return !which;
+}
+
+static inline int with_digit(int number, int digit)
+{
+    return 2 * number + digit;
 }
 
 static inline double absolute(double x)

@@ -34,6 +34,14 @@ typedef struct {
     REAL a_1, a_2, phi_1, phi_2, psi_1, psi_2;
 } OF(coefficients);
 
+/* All that goes on from tick to tick, as in motion/state.py. */
+typedef struct {
+    REAL x[2], turned[2], origin[SHAFTS], torque[PORTS], flow, memory[CLUTCHES];
+    REAL force[CLUTCHES], held[PORTS];
+    REAL ticks, coarse_steps;
+    REAL seen[STATE];     /* of the last point of the passive law: what need not be found again */
+} OF(state);
+
 /* What is exact for one response and one length of step. */
 typedef struct {
     REAL step[4][5];      /* rows of w and s, then of their integrals; of (w, s, T_3, T_1, T_2) */

@@ -9,17 +9,8 @@
 
 #include <string.h>
 
-#include "../differential.h"
-
-enum { ROOM = 2 };   /* patterns of signs that are kept */
-
-/* One of many, beside its model. */
-typedef struct {
-    state now;
-    int failed;
-    patterns known;
-    pattern kept[ROOM];
-} member;
+#include "member.h"
+#include "wide.h"
 
 /* The buffers of a call; each that was taken is given back. */
 enum { MODELS, MEMBERS, TORQUES, FORCES, OUT, BUFFERS };
@@ -50,11 +41,28 @@ static int take(buffers *b, int which, PyObject *object, int flags, Py_ssize_t l
     return 1;
 }
 
-static patterns *known_of(member *one)
+patterns *dm_known_of(member *one)
 {
     one->known.room = ROOM;
-    one->known.kept = one->kept;   /* the memory may have moved */
+    one->known.kept = one->kept;
     return &one->known;
+}
+
+/* Return what advances so many members at once on this machine, NULL where nothing does. */
+static stepper *stepper_of(Py_ssize_t lanes)
+{
+#ifdef HAS_X86_LANES
+    if (lanes == 8 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")
+        && __builtin_cpu_supports("avx512vl"))
+        return dm_step_8;
+    if (lanes == 4 && __builtin_cpu_supports("avx2"))
+        return dm_step_4;
+#endif
+#ifdef HAS_LANES
+    if (lanes == 2)
+        return dm_step_2;
+#endif
+    return NULL;
 }
 
 static const char DOC_MAKE[] =
@@ -118,8 +126,6 @@ static PyObject *reset_all(PyObject *module, PyObject *args)
     Py_RETURN_NONE;
 }
 
-enum { COLUMNS = SHAFTS + SHAFTS + MOMENTS + 5 };   /* of what a member reports */
-
 /* Put what a member reports into a row. */
 static void put(const member *one, const report *told, double *row)
 {
@@ -132,23 +138,51 @@ static void put(const member *one, const report *told, double *row)
     *row++ = one->failed;
 }
 
+void dm_member_tick(const task *of, ptrdiff_t n, ptrdiff_t t)
+{
+    member *one = &of->members[n];
+    const ptrdiff_t place = t * of->of_tick + n * of->of_member;
+    report told = {{0.0}, {0.0}, {0.0}};
+    if (!one->failed)
+        one->failed = dm_tick(&of->models[n], &one->now, dm_known_of(one),
+                              of->torques + PORTS * place,
+                              of->forces ? of->forces + CLUTCHES * place : NULL, NULL,
+                              of->rows ? &told : NULL) != 0;
+    if (of->rows)
+        put(one, &told, &of->rows[(t * of->count + n) * COLUMNS]);
+}
+
 static const char DOC_STEP[] =
-    "step_all(models, members, torques, forces, out, ticks, of_tick, of_member, first, last)"
-    "\n--\n\n"
+    "step_all(models, members, torques, forces, out, ticks, of_tick, of_member, first, last,"
+    " lanes)\n--\n\n"
     "Advance some members by some ticks, without the interpreter.\n\n"
     "Torques are doubles, N m, those of a tick and a member begin at tick of_tick + member\n"
     "of_member; forces, N, likewise with 2/3 of that, or None. What is reported after each tick,\n"
     "as report_all has it, goes into out, (ticks, members, 20), or it is None. A member whose\n"
-    "tick leads out of the range of numbers fails: it stays where it was.";
+    "tick leads out of the range of numbers fails: it stays where it was. lanes, one of LANES, is\n"
+    "how many are advanced at once where that can be; it changes no bit.";
+
+/* Advance some members by a task, so many at once if they can be. */
+static void step_members(const task *of, Py_ssize_t lanes, Py_ssize_t first, Py_ssize_t last)
+{
+    stepper *step = stepper_of(lanes);
+    const setup *run = &of->models[first].run;
+    if (step && run->is_passive != 0.0 && run->is_lagged == 0.0)
+        for (; first + lanes <= last; first += lanes)
+            step(of, first);
+    for (; first < last; first++)
+        for (Py_ssize_t t = 0; t < of->ticks; t++)
+            dm_member_tick(of, first, t);
+}
 
 static PyObject *step_all(PyObject *module, PyObject *args)
 {
     PyObject *models, *members, *torques, *forces, *out;
-    Py_ssize_t ticks, of_tick, of_member, first, last;
+    Py_ssize_t ticks, of_tick, of_member, first, last, lanes;
     buffers b = {0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "OOOOOnnnnn", &models, &members, &torques, &forces, &out,
-                          &ticks, &of_tick, &of_member, &first, &last))
+    if (!PyArg_ParseTuple(args, "OOOOOnnnnnn", &models, &members, &torques, &forces, &out,
+                          &ticks, &of_tick, &of_member, &first, &last, &lanes))
         return NULL;
     const Py_ssize_t places = (ticks - 1) * of_tick + (last - 1) * of_member + 1;
     const Py_ssize_t size = (Py_ssize_t)sizeof(double);
@@ -160,26 +194,15 @@ static PyObject *step_all(PyObject *module, PyObject *args)
         && (out == Py_None
             || take(&b, OUT, out, PyBUF_WRITABLE, ticks * COLUMNS * size
                     * (b.view[MEMBERS].len / (Py_ssize_t)sizeof(member))))) {
-        const model *m = b.view[MODELS].buf;
-        member *all = b.view[MEMBERS].buf;
-        const double *T = b.view[TORQUES].buf;
-        const double *A = b.taken[FORCES] ? b.view[FORCES].buf : NULL;
-        double *rows = b.taken[OUT] ? b.view[OUT].buf : NULL;
-        const Py_ssize_t count = b.view[MEMBERS].len / (Py_ssize_t)sizeof(member);
+        const task of = {
+            .models = b.view[MODELS].buf, .members = b.view[MEMBERS].buf,
+            .torques = b.view[TORQUES].buf, .forces = b.taken[FORCES] ? b.view[FORCES].buf : NULL,
+            .rows = b.taken[OUT] ? b.view[OUT].buf : NULL,
+            .count = b.view[MEMBERS].len / (Py_ssize_t)sizeof(member), .ticks = ticks,
+            .of_tick = of_tick, .of_member = of_member};
         Py_BEGIN_ALLOW_THREADS
-        for (Py_ssize_t n = first; n < last; n++) {
-            patterns *known = known_of(&all[n]);
-            report told = {{0.0}, {0.0}, {0.0}};
-            for (Py_ssize_t t = 0; t < ticks && (rows || !all[n].failed); t++) {
-                const Py_ssize_t place = t * of_tick + n * of_member;
-                if (!all[n].failed)
-                    all[n].failed = dm_tick(&m[n], &all[n].now, known, T + PORTS * place,
-                                            A ? A + CLUTCHES * place : NULL, NULL,
-                                            rows ? &told : NULL) != 0;
-                if (rows)
-                    put(&all[n], &told, &rows[(t * count + n) * COLUMNS]);
-            }
-        }
+        if (first < last)
+            step_members(&of, lanes, first, last);
         Py_END_ALLOW_THREADS
     }
     give_back(&b);
@@ -210,7 +233,7 @@ static PyObject *report_all(PyObject *module, PyObject *args)
         Py_BEGIN_ALLOW_THREADS
         for (Py_ssize_t n = first; n < last; n++) {
             report told = {{0.0}, {0.0}, {0.0}};
-            dm_report(&m[n], &all[n].now, known_of(&all[n]), &told);
+            dm_report(&m[n], &all[n].now, dm_known_of(&all[n]), &told);
             put(&all[n], &told, &values[n * COLUMNS]);
         }
         Py_END_ALLOW_THREADS
@@ -231,7 +254,15 @@ static PyMethodDef functions[] = {
 
 int dm_add_ensemble(PyObject *module)
 {
-    return PyModule_AddFunctions(module, functions)
+    PyObject *lanes = PyList_New(0);
+    for (Py_ssize_t n = 1; lanes && n <= 8; n *= 2) {
+        PyObject *number = n == 1 || stepper_of(n) ? PyLong_FromSsize_t(n) : NULL;
+        if (number)
+            PyList_Append(lanes, number);
+        Py_XDECREF(number);
+    }
+    return PyModule_AddObject(module, "LANES", lanes)
+        || PyModule_AddFunctions(module, functions)
         || PyModule_AddIntConstant(module, "MODEL", sizeof(model))
         || PyModule_AddIntConstant(module, "MEMBER", sizeof(member)) ? -1 : 0;
 }
