@@ -22,14 +22,16 @@ from dm_ros.motion.models import LOSS_LAWS, PAPER
 from dm_ros.tools.progress import progress
 
 DT = 1e-3   # s
-BLOCK = 50  # ticks in a call
+BLOCK = 500  # ticks in a call
 HEAD = ['a tick at 1 kHz', 'members', 'to make, us', 'one thread, ns', 'all cores, ns',
         'Simulation.step in C, us', 'in Python, us', 'one thread over C', 'over Python']
+AT_ONCE = '{} at once, ns'
 LEGEND = """\
 All rows step the reference load of the scenarios at 1 kHz. `to make` is that of one member, `one
 thread` and `all cores` are the time of `Ensemble.run` over {block} ticks, for one tick and member.
-The ratios are of `Simulation.step`, with its snapshot, to `one thread`. All are medians over
-{passes} passes through all rows in turn.
+The ratios are of `Simulation.step`, with its snapshot, to `one thread`, which takes {lanes}
+members at once in a register; other machines take fewer. All are medians over {passes} passes
+through all rows in turn.
 """
 
 
@@ -57,8 +59,10 @@ def measure(variant, law, members, ticks):
     rows = np.array(load)
     sets = [{}] * members
     found = [seconds(lambda: Ensemble(variant, sets, DT, loss_law=law))[0] / members]
-    for threads in (1, None):
-        ensemble = Ensemble(variant, sets, DT, loss_law=law, threads=threads)
+    lanes = core._chosen('').LANES
+    for threads, at_once in ((1, lanes[-1]), (None, lanes[-1]), *((1, n) for n in lanes[:-1])):
+        with mock.patch('dm_ros.ensemble.lanes_of', lambda _, at_once=at_once: at_once):
+            ensemble = Ensemble(variant, sets, DT, loss_law=law, threads=threads)
         times = [seconds(ensemble.run, rows[n:n + BLOCK])[0] for n in range(0, ticks, BLOCK)]
         found.append(sum(times) / (ticks * members))
     return [*found, of_steps(core.Ticker, variant, law, load),
@@ -80,9 +84,10 @@ def main():
     if not core.Ticker:
         print('ensembles: the core in C is not built or not chosen: nothing to measure')
         return
+    lanes = core._chosen('').LANES
     print(f'{date.today()}, {platform.machine()}, {len(os.sched_getaffinity(0))} cores, '
           f'Python {platform.python_version()}, load average {os.getloadavg()[0]:.1f} before\n\n'
-          + LEGEND.format(block=BLOCK, passes=arguments.passes))
+          + LEGEND.format(block=BLOCK, lanes=lanes[-1], passes=arguments.passes))
     rows = [(variant, law) for law in LOSS_LAWS for variant in ('symmetric_ode', 'lsd_ode')]
     found = {row: [] for row in rows}
     ticks = max(BLOCK, arguments.ticks // BLOCK * BLOCK)
@@ -90,14 +95,16 @@ def main():
         for variant, law in rows:
             members = max(1, arguments.members // (10 if law == PAPER else 1))
             found[variant, law].append(measure(variant, law, members, ticks))
-    print('|', ' | '.join(HEAD), '|')
-    print('|---' + '|---:' * (len(HEAD) - 1) + '|')
+    head = HEAD + [AT_ONCE.format(n) for n in lanes[:-1]]
+    print('|', ' | '.join(head), '|')
+    print('|---' + '|---:' * (len(head) - 1) + '|')
     for (variant, law), runs in found.items():
-        made, one, all_cores, in_c, in_python = np.median(runs, axis=0)
+        made, one, all_cores, *fewer, in_c, in_python = np.median(runs, axis=0)
         members = max(1, arguments.members // (10 if law == PAPER else 1))
-        print(f'| {variant} {law} | {members} | {1e6 * made:.0f} | {1e9 * one:.0f} '
-              f'| {1e9 * all_cores:.0f} | {1e6 * in_c:.2f} | {1e6 * in_python:.2f} '
-              f'| {in_c / one:.1f} | {in_python / one:.0f} |')
+        print(f'| {variant} {law} | {members} | {1e6 * made:.0f} | {1e9 * one:.1f} '
+              f'| {1e9 * all_cores:.1f} | {1e6 * in_c:.2f} | {1e6 * in_python:.2f} '
+              f'| {in_c / one:.1f} | {in_python / one:.0f} '
+              + ''.join(f'| {1e9 * time:.1f} ' for time in fewer) + '|')
 
 
 if __name__ == '__main__':

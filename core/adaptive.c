@@ -12,19 +12,6 @@
 #define BENDS job->law->bends
 #define APPLY_PHI_2 dm_apply_phi_2
 
-/* The one step of a job is watched always. */
-static int watched(const step *job)
-{
-    (void)job;
-    return 1;
-}
-
-static int watch(const step *job, int which)
-{
-    (void)job;
-    return which;
-}
-
 #include "part_equations.h"
 
 enum { MOST_RESORTS = 1000 };
@@ -54,6 +41,8 @@ int dm_advance(step *job, pair y)
         here = &job->points[0];
     }
     point *there = &job->points[here == &job->points[0]];
+    if (!(fabs(here->e_0) + fabs(here->e_s) < FASTEST))
+        return -1;
     slopes at_start = law->jacobian(job, here);
     trial found;
     for (int n = 0; n < law->most_trials; n++) {

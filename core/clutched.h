@@ -10,13 +10,6 @@
 
 #include "core.h"
 
-/* In the order of clutched.Coefficients. */
-typedef struct {
-    double A_ww, A_ws, A_sw, A_ss, C_w1, C_w2, C_s1, C_s2, P_1w, P_1s, P_2w, P_2s;
-    double W_11, W_12, W_21, W_22, B_w0, B_w1, B_w2, B_s0, B_s1, B_s2;
-    double Q_10, Q_11, Q_12, Q_20, Q_21, Q_22, a_1, a_2, phi_1, phi_2, psi_1, psi_2;
-} clutched_coefficients;
-
 /* What is held in a step. */
 enum { B_W, B_S, M_ONE, M_TWO, S_1, S_2 };
 

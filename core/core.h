@@ -89,6 +89,19 @@ static inline double quotient(step *job, double a, double b)
     return a / b;
 }
 
+/* The one step of a job is watched always. */
+static inline int watched(const step *job)
+{
+    (void)job;
+    return 1;
+}
+
+static inline int watch(const step *job, int which)
+{
+    (void)job;
+    return which;
+}
+
 /* Put a root of a function that grows on the whole into found; return 0 where none is in reach. */
 int dm_root(const context *f, double start, double *found);
 

@@ -34,9 +34,7 @@ int dm_moments(const model *m)
 /* Put the speeds of the shafts with a port into speeds, from x, or their angles. */
 static void at_ports(const model *m, const double *x, double *speeds)
 {
-    speeds[0] = (m->g_F != 0.0 ? m->g_F : 1.0) * x[0];
-    speeds[1] = x[0] + m->k_1 * x[1];
-    speeds[2] = x[0] - m->k_2 * x[1];
+    port_speeds_of(m->g_F, m->k_1, m->k_2, x, speeds);
 }
 
 /* Put the speeds of all shafts into speeds, from x, or their angles. */
@@ -81,18 +79,12 @@ void dm_adopt(const model *before, const model *after, state *now)
 static double flow_of(const model *m, const double *x, const double *T, double last)
 {
     const double deadband = m->run.deadband;
+    const double power = input_power(T[0], m->g_F, x[0]);
     if (m->run.is_passive != 0.0)
-        return flow_of_input(T[0], m->g_F, x[0], m->sign_speed, deadband, last);
-    const double power = T[0] * (m->g_F != 0.0 ? m->g_F : 1.0) * x[0];
+        return flow_of_input(power, x[0], m->sign_speed, deadband, last);
     double speeds[PORTS];
     at_ports(m, x, speeds);
-    const double output = T[1] * speeds[1] + T[2] * speeds[2];
-    const double excess = fabs(power) - fabs(output);
-    if (excess > deadband)
-        return 1.0;
-    if (excess < -deadband || (excess == deadband && deadband == 0.0 && output != 0.0))
-        return -1.0;
-    return last;
+    return flow_of_powers(power, T[1] * speeds[1] + T[2] * speeds[2], deadband, last);
 }
 
 /* Put the friction at full slip that does not follow the moments of a step into S. */

@@ -6,7 +6,7 @@
  * EVALUATE, JACOBIAN, BENDS and APPLY_PHI_2 are those of its includer.
  */
 
-static const double BACKWARD = 3.0, SAFETY = 0.8, SHRINK = 0.1, GROW = 5.0;
+static const double BACKWARD = 3.0, SAFETY = 0.8, SHRINK = 0.1, GROW = 5.0, FASTEST = 1e150;
 
 /* Return h (3 I - |h| J)^-1 (f(there) - f(here) - J d) of two points that are d apart. */
 static OF(pair) nonlinear_part(OF(step) *job, const OF(point) *here, const OF(point) *there,
@@ -41,23 +41,23 @@ static void try_part(OF(step) *job, const OF(point) *here, OF(matrix) J, REAL w,
     const OF(pair) c = nonlinear_part(job, here, there, J, h, d_w, d_s);
     const REAL allowed = job->tolerance + relative * (absolute(d_w) + absolute(d_s));
     REAL error = OF(quotient)(job, absolute(c.w) + absolute(c.s), allowed);
-    const MASK fits = (error <= 1.0) & watched(job);
+    const MASK fits = (error <= 1.0) & OF(watched)(job);
     found->has_slopes = fits & no_mask();
     if (any(fits)) {
-        const MASK before = watch(job, fits);
+        const MASK before = OF(watch)(job, fits);
         EVALUATE(job, w + d_w + c.w, s + d_s + c.s, there);
-        const MASK bends = fits & BENDS(job, here, there);
-        if (any(bends)) {
-            watch(job, bends);
+        const MASK bent = fits & BENDS(job, here, there);
+        if (any(bent)) {
+            OF(watch)(job, bent);
             found->at_end = JACOBIAN(job, there);
-            found->has_slopes = bends;
+            found->has_slopes = bent;
             const OF(pair) r = nonlinear_part(job, there, here, found->at_end.J, -h, -d_w - c.w,
                                               -d_s - c.s);
             const REAL seen = OF(quotient)(job, absolute(r.w) + absolute(r.s),
                                            BACKWARD * allowed);
-            error = pick(bends & (seen > error), seen, error);
+            error = pick(bent & (seen > error), seen, error);
         }
-        watch(job, before);
+        OF(watch)(job, before);
     }
     found->d = (OF(pair)){d_w, d_s};
     found->c = c;

@@ -16,7 +16,7 @@ typedef long long MASK __attribute__((vector_size(8 * LANES)));
 
 static inline REAL fill(double value)
 {
-    REAL all;
+    REAL all = {0};
     for (int n = 0; n < LANES; n++)
         all[n] = value;
     return all;
@@ -57,7 +57,7 @@ static inline REAL absolute(REAL x)
 
 static inline REAL root_of(REAL x)
 {
-    REAL all;
+    REAL all = {0};
     for (int n = 0; n < LANES; n++)
         all[n] = sqrt(x[n]);
     return all;

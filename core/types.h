@@ -34,6 +34,13 @@ typedef struct {
     REAL a_1, a_2, phi_1, phi_2, psi_1, psi_2;
 } OF(coefficients);
 
+/* The same of the paper's law with clutches, in the order of clutched.Coefficients. */
+typedef struct {
+    REAL A_ww, A_ws, A_sw, A_ss, C_w1, C_w2, C_s1, C_s2, P_1w, P_1s, P_2w, P_2s;
+    REAL W_11, W_12, W_21, W_22, B_w0, B_w1, B_w2, B_s0, B_s1, B_s2;
+    REAL Q_10, Q_11, Q_12, Q_20, Q_21, Q_22, a_1, a_2, phi_1, phi_2, psi_1, psi_2;
+} OF(clutched_coefficients);
+
 /* All that goes on from tick to tick, as in motion/state.py. */
 typedef struct {
     REAL x[2], turned[2], origin[SHAFTS], torque[PORTS], flow, memory[CLUTCHES];

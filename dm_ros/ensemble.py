@@ -273,13 +273,18 @@ def blanked(table):
     return table
 
 
+def lanes_of(core_in_c):
+    """Return how many members share the registers of a thread, which changes no bit."""
+    return max(core_in_c.LANES)
+
+
 class InC:
     """The members of an ensemble in C."""
 
     def __init__(self, ensemble, threads):
         self._core = core._chosen('')
         self._n = n = len(ensemble)
-        self.lanes = max(self._core.LANES)   # stepped at once on one thread; they change no bit
+        self._lanes = lanes_of(self._core)
         self._threads = max(1, min(threads or len(os.sched_getaffinity(0)), n // SMALL or 1))
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
         self._models = np.zeros((n, self._core.MODEL), np.uint8)
@@ -335,7 +340,7 @@ class InC:
         ticks, wide, _ = torques.shape
         self._all(lambda first, last: self._core.step_all(
             self._models, self._state, torques, forces, told, ticks, wide, int(wide > 1), first,
-            last, self.lanes))
+            last, self._lanes))
 
     def report(self):
         out = np.empty((self._n, COLUMNS))

@@ -21,17 +21,20 @@ from dm_ros import (
 from dm_ros.mechanism.sets import possible, table_of
 from dm_ros.motion.models import LOSS_LAWS
 
-built = core._chosen('') is not None
-LANGUAGES = ['C', 'Python'] if built else ['Python']
+in_c = core._chosen('')
+LANES = in_c.LANES if in_c else []   # how many members can share a register
 TICKS = 30
+ALL = ('velocity', 'position', 'moment', 'power_flow', 'clutch_force')
 
 
-@pytest.fixture(params=LANGUAGES)
+@pytest.fixture(params=[*(f'C, {n} at once' for n in LANES), 'Python'])
 def language(request):
     """Do it in this language."""
-    ticker = core._chosen('').Ticker if request.param == 'C' else None
-    with mock.patch.object(core, 'Ticker', ticker):
-        yield request.param
+    language, *lanes = request.param.split()
+    language = language.strip(',')
+    with mock.patch.object(core, 'Ticker', in_c.Ticker if lanes else None), \
+            mock.patch('dm_ros.ensemble.lanes_of', lambda _: int(lanes[0])):
+        yield language
 
 
 def sets_of(variant, count, clutched=False):
@@ -48,13 +51,14 @@ def sets_of(variant, count, clutched=False):
 @pytest.mark.parametrize('variant, clutched', [*((v, False) for v in VARIANTS),
                                                ('symmetric_ode', True)])
 def test_each_member_moves_like_a_simulation_of_its_own(variant, clutched, loss_law, language):
-    sets, rng = sets_of(variant, 7, clutched), np.random.default_rng(5)
+    count = 11   # some are left over, however many go at once
+    sets, rng = sets_of(variant, count, clutched), np.random.default_rng(5)
     more = {'loss_law': loss_law, 'substeps': 2, 'power_flow_deadband': 3.0}
-    start = rng.normal(0, 50, (7, 2))
+    start = rng.normal(0, 50, (count, 2))
     ensemble = Ensemble(variant, sets, 0.002, initial_velocity=start, threads=3, **more)
     assert ensemble.language == language
-    T = rng.normal(0, 100, (TICKS, 7, 3))
-    A = rng.uniform(0, 500, (TICKS, 7, len(ensemble.clutches)))
+    T = rng.normal(0, 100, (TICKS, count, 3))
+    A = rng.uniform(0, 500, (TICKS, count, len(ensemble.clutches)))
     singles = [Simulation(variant, 0.002, p, initial_velocity=speeds, **more)
                for p, speeds in zip(sets, start.tolist())]
     ensemble.run(T[:9], A[:9])   # at once, or tick by tick
@@ -64,7 +68,7 @@ def test_each_member_moves_like_a_simulation_of_its_own(variant, clutched, loss_
         for torque, force in zip(torques, forces):
             simulation.advance(torque.tolist(), tuple(force.tolist()))
     told = [simulation.snapshot() for simulation in singles]
-    for name in ('velocity', 'position', 'moment', 'power_flow', 'clutch_force'):
+    for name in ALL:
         expected = np.array([getattr(snapshot, name) for snapshot in told], float)
         assert getattr(ensemble, name).tobytes() == expected.tobytes(), name
     assert ensemble.coarse_steps.tolist() == [s.coarse_steps for s in singles]
@@ -80,19 +84,49 @@ def test_each_member_moves_like_a_simulation_of_its_own(variant, clutched, loss_
                                                ('lsd_ode', False)])
 def test_what_is_recorded_is_what_every_tick_reports(variant, clutched, language, monkeypatch):
     monkeypatch.setattr('dm_ros.ensemble.BLOCK', 8 * 20 * 5 * 4)   # of which 4 ticks make one
-    sets, names = sets_of(variant, 5, clutched), ('velocity', 'position', 'moment', 'power_flow',
-                                                  'clutch_force')
-    T = np.random.default_rng(2).normal(0, 100, (TICKS, 5, 3))
+    count = 11
+    sets = sets_of(variant, count, clutched)
+    T = np.random.default_rng(2).normal(0, 100, (TICKS, count, 3))
     T[9:, 3] = 1e308
-    recorded = Ensemble(variant, sets).run(T, record=names)
+    recorded = Ensemble(variant, sets).run(T, record=ALL)
     ensemble = Ensemble(variant, sets)
     for n in range(TICKS):
         ensemble.step(T[n])
-        for name in names:
+        for name in ALL:
             now = getattr(ensemble, name)
             assert recorded[name][n].tobytes() == now.tobytes(), (name, n)
-    assert recorded['velocity'].shape == (TICKS, 5, len(ensemble.shafts))
-    assert ensemble.failed.tolist() == [False, False, False, True, False]
+    assert recorded['velocity'].shape == (TICKS, count, len(ensemble.shafts))
+    assert ensemble.failed.nonzero()[0].tolist() == [3]
+
+
+@pytest.mark.skipif(not LANES, reason='the core in C is not built')
+@pytest.mark.parametrize('loss_law', LOSS_LAWS)
+@pytest.mark.parametrize('variant, clutched', [('symmetric_ode', False), ('symmetric_ode', True),
+                                               ('lsd_ode', False)])
+def test_how_many_go_at_once_changes_no_bit(variant, clutched, loss_law):
+    count, ticks = 67, 150
+    sets, rng = sets_of(variant, count, clutched), np.random.default_rng(9)
+    # from a creep to full speed, under torques that jump, stay, balance each other or are none
+    start = rng.normal(0, 1, (count, 2)) * 10 ** rng.uniform(-2, 2.5, (count, 1))
+    T = rng.normal(0, 1, (ticks, count, 3)) * 10 ** rng.uniform(-1, 3.5, (count, 1))
+    T[30:] = np.repeat(T[30::20], 20, axis=0)
+    T[:, ::3, 1] = T[:, ::3, 2] = -T[:, ::3, 0] / 2
+    T[80:110] = 0.0
+    T[120:, 5:12] = 1e308
+    runs = []
+    for lanes in LANES:
+        with mock.patch('dm_ros.ensemble.lanes_of', lambda _, lanes=lanes: lanes):
+            ensemble = Ensemble(variant, sets, 0.002, initial_velocity=start, loss_law=loss_law)
+        A = np.random.default_rng(7).uniform(-500, 500, (ticks, count, len(ensemble.clutches)))
+        A = np.maximum(A, 0.0)
+        told = ensemble.run(T[:100], A[:100], record=ALL)
+        for n in range(100, 105):
+            ensemble.step(T[n], A[n])
+        ensemble.run(T[105:], A[105:])
+        runs.append([told[name].tobytes() for name in ALL] + [
+            getattr(ensemble, name).tobytes() for name in (*ALL, 'coarse_steps', 'failed')])
+        assert ensemble.failed.any() and not ensemble.failed.all()
+    assert all(run == runs[0] for run in runs)
 
 
 def test_what_cannot_be_recorded_is_refused_by_name():

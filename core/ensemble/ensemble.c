@@ -159,15 +159,17 @@ static const char DOC_STEP[] =
     "Torques are doubles, N m, those of a tick and a member begin at tick of_tick + member\n"
     "of_member; forces, N, likewise with 2/3 of that, or None. What is reported after each tick,\n"
     "as report_all has it, goes into out, (ticks, members, 20), or it is None. A member whose\n"
-    "tick leads out of the range of numbers fails: it stays where it was. lanes, one of LANES, is\n"
-    "how many are advanced at once where that can be; it changes no bit.";
+    "tick leads out of the range of numbers fails: it stays where it was. lanes, one of LANES,\n"
+    "is how many are advanced at once where that can be; it changes no bit.";
 
 /* Advance some members by a task, so many at once if they can be. */
 static void step_members(const task *of, Py_ssize_t lanes, Py_ssize_t first, Py_ssize_t last)
 {
     stepper *step = stepper_of(lanes);
     const setup *run = &of->models[first].run;
-    if (step && run->is_passive != 0.0 && run->is_lagged == 0.0)
+    const int is_rare = run->is_lagged != 0.0
+        || (run->is_passive == 0.0 && run->is_symmetric != 0.0 && run->has_clutches != 0.0);
+    if (step && !is_rare)
         for (; first + lanes <= last; first += lanes)
             step(of, first);
     for (; first < last; first++)

@@ -1,7 +1,7 @@
 /* Copyright 2026 dm_ros developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * Ticks of LANES members at once, under the passive law: as dm_tick, to the last bit.
+ * Ticks of LANES members at once: as dm_tick, to the last bit.
  *
  * Whatever is rare, such as signs that are not found in a few rounds or a tick of many parts, is
  * left to dm_tick, which then takes the whole tick of that member.
@@ -24,7 +24,8 @@ typedef struct {
 
 /* A step of all; of those that are not watched nothing matters. */
 typedef struct {
-    const OF(coefficients) *coefficients;
+    const void *coefficients;   /* of the law */
+    int is_passive;
     REAL u[HELD], h, tolerance;
     const REAL *seen;
     MASK watched, broken;
@@ -36,19 +37,20 @@ static inline REAL OF(quotient)(OF(step) *job, REAL a, REAL b)
     return a / b;
 }
 
-static inline MASK watched(const OF(step) *job)
+static inline MASK OF(watched)(const OF(step) *job)
 {
     return job->watched;
 }
 
 /* Watch some; return which were watched. */
-static inline MASK watch(OF(step) *job, MASK which)
+static inline MASK OF(watch)(OF(step) *job, MASK which)
 {
     const MASK before = job->watched;
     job->watched = which;
     return before;
 }
 
+#include "../clutched_equations.h"
 #include "../exact_equations.h"
 #include "../exponentials_equations.h"
 #include "../passive_equations.h"
@@ -81,7 +83,7 @@ static MASK same_bits(REAL a, REAL b)
     return (MASK)a == (MASK)b;
 }
 
-static void evaluate(OF(step) *job, REAL w, REAL s, OF(point) *at)
+static void evaluate_passive(OF(step) *job, REAL w, REAL s, OF(point) *at)
 {
     REAL q[2];
     OF(signs) found;
@@ -109,14 +111,28 @@ static void evaluate(OF(step) *job, REAL w, REAL s, OF(point) *at)
     job->broken |= open;
 }
 
+static void evaluate(OF(step) *job, REAL w, REAL s, OF(point) *at)
+{
+    if (job->is_passive)
+        evaluate_passive(job, w, s, at);
+    else
+        evaluate_clutched(job, w, s, at);
+}
+
 static OF(slopes) slopes_at(OF(step) *job, const OF(point) *at)
 {
-    return (OF(slopes)){jacobian_at(job, at)};
+    REAL F[4];
+    return (OF(slopes)){job->is_passive ? jacobian_at(job, at) : jacobian_clutched(job, at, F)};
+}
+
+static MASK bends(const OF(step) *job, const OF(point) *here, const OF(point) *there)
+{
+    return job->is_passive ? bends_between(job, here, there) : opposite(no_mask());
 }
 
 #define EVALUATE evaluate
 #define JACOBIAN slopes_at
-#define BENDS bends_between
+#define BENDS bends
 #define APPLY_PHI_2 apply_phi_2
 
 #include "../part_equations.h"
@@ -154,10 +170,12 @@ static const OF(point) *advance(OF(step) *job, OF(pair) y, OF(point) *here, OF(p
     OF(point) *there = &points[0], *last = &points[1];
     OF(trial) found;
     MASK open = job->watched;
+    const double relative = job->is_passive ? dm_passive.relative : dm_clutched.relative;
+    job->broken |= open & opposite(absolute(here->e_0) + absolute(here->e_s) < FASTEST);
     job->seen = NULL;
-    OF(matrix) J = jacobian_at(job, here);
+    OF(matrix) J = found.at_end.J = slopes_at(job, here).J;
     for (int n = 0; n < TRIALS; n++) {
-        try_part(job, here, J, w, s, h, dm_passive.relative, there, &found);
+        try_part(job, here, J, w, s, h, relative, there, &found);
         const MASK fits = (found.error <= 1.0) & open;
         const OF(pair) d = found.d, c = found.c;
         angle_w = pick(fits, angle_w + (found.integral.w + h * c.w / 4), angle_w);
@@ -179,7 +197,7 @@ static const OF(point) *advance(OF(step) *job, OF(pair) y, OF(point) *here, OF(p
         if (any(goes_on)) {
             OF(matrix) next = J;
             if (any(goes_on & opposite(found.has_slopes)))
-                next = jacobian_at(job, there);
+                next = slopes_at(job, there).J;
             const REAL *known = (const REAL *)&found.at_end, *new = (const REAL *)&next;
             REAL *into = (REAL *)&J;
             for (int i = 0; i < 4; i++)
@@ -201,7 +219,10 @@ typedef struct {
     const task *of;
     ptrdiff_t first;
     const model *m;                        /* that of the first */
+    int is_passive, has_exact;             /* or every step is exact; or some, by their signs */
     OF(coefficients) k;
+    OF(clutched_coefficients) paper[3];    /* direct flow, reverse flow, each its own */
+    OF(exact) exact[3];
     REAL h, tolerance, k_1, k_2, g_F, g_2s, deadband;
     REAL preload[CLUTCHES], f[CLUTCHES], radius[CLUTCHES], limit[CLUTCHES], rise[CLUTCHES];
     OF(state) now;
@@ -229,7 +250,7 @@ static void get_lane(const void *from, int lane, void *into, size_t size)
         numbers[n] = values[n * LANES + lane];
 }
 
-/* Put the same numbers of all into their lanes; from are those of the first, stride bytes apart. */
+/* Put numbers of all into their lanes; from are those of the first, stride bytes apart. */
 static inline void set_lanes(void *into, const void *from, size_t stride, size_t size)
 {
     double *values = into;
@@ -255,7 +276,16 @@ static void load(block *b, const task *of, ptrdiff_t first)
     b->of = of;
     b->first = first;
     b->m = m;
-    set_lanes(&b->k, &m->law.passive, sizeof *m, sizeof m->law.passive);
+    b->is_passive = m->run.is_passive != 0.0;
+    b->has_exact = m->run.is_symmetric != 0.0 && m->run.has_clutches == 0.0;
+    for (int n = 0; n < 2; n++) {
+        if (b->is_passive)
+            set_lanes(&b->k, &m->law.passive, sizeof *m, sizeof m->law.passive);
+        else if (b->has_exact)
+            set_lanes(&b->exact[n], &m->law.exact[n].map, sizeof *m, sizeof(exact));
+        else
+            set_lanes(&b->paper[n], &m->law.paper.k[n], sizeof *m, sizeof m->law.paper.k[n]);
+    }
     set_lanes(&b->h, &m->h, sizeof *m, sizeof m->h);
     set_lanes(&b->tolerance, &m->tolerance, sizeof *m, sizeof m->tolerance);
     set_lanes(&b->k_1, &m->k_1, sizeof *m, sizeof m->k_1);
@@ -320,20 +350,47 @@ static MASK exact_steps(const block *b, MASK which, OF(pair) x, const REAL *T, O
     return held;
 }
 
-/* Advance by a solver step; the bits where it cannot are returned. */
-static MASK solver_step(block *b, int has_patterns, OF(pair) x, const REAL *seen, const REAL *T,
-                        const REAL *S, OF(moved) *did)
+/* Return which of direct flow, reverse flow and each its own has what holds, of this size. */
+static const void *of_flow(REAL flow, void *three, size_t size)
+{
+    char *direct = three, *reverse = direct + size, *own = reverse + size;
+    const MASK is_reverse = flow < 0.0;
+    if (!any(is_reverse))
+        return direct;
+    if (!any(opposite(is_reverse)))
+        return reverse;
+    memcpy(own, direct, size);
+    put(is_reverse, size / sizeof(REAL), (const REAL *)reverse, (REAL *)own);
+    return own;
+}
+
+/* Advance by a solver step; return where it cannot. */
+static MASK solver_step(block *b, OF(pair) x, const REAL *seen, const REAL *T, const REAL *S,
+                        REAL flow, OF(moved) *did)
 {
     OF(step) job;
-    job.coefficients = &b->k;
+    MASK fast = no_mask();
     job.h = b->h;
     job.tolerance = b->tolerance;
-    job.seen = seen;
-    job.broken = no_mask();
-    memcpy(job.u, T, PORTS * sizeof *T);
-    memcpy(job.u + PORTS, S, CLUTCHES * sizeof *S);
-    const MASK fast = has_patterns ? is_fast(&b->k, x) & b->alive : no_mask();
-    did->is_exact = exact_steps(b, fast & b->has_way, x, T, did);
+    job.is_passive = b->is_passive;
+    job.broken = did->is_exact = no_mask();
+    if (b->is_passive) {
+        job.coefficients = &b->k;
+        job.seen = seen;
+        memcpy(job.u, T, PORTS * sizeof *T);
+        memcpy(job.u + PORTS, S, CLUTCHES * sizeof *S);
+        if (b->has_exact) {
+            fast = is_fast(&b->k, x) & b->alive;
+            did->is_exact = exact_steps(b, fast & b->has_way, x, T, did);
+        }
+    } else if (b->has_exact) {
+        exact_step(of_flow(flow, b->exact, sizeof *b->exact), x, T, &did->end, &did->integral);
+        did->is_exact = opposite(no_mask());
+        return no_mask();
+    } else {
+        job.coefficients = of_flow(flow, b->paper, sizeof *b->paper);
+        hold(job.coefficients, T, S, job.u);
+    }
     job.watched = b->alive & opposite(did->is_exact);
     if (!any(job.watched))
         return job.broken;
@@ -354,10 +411,9 @@ static MASK solver_step(block *b, int has_patterns, OF(pair) x, const REAL *seen
 }
 
 /* Put what is reported after a tick into the rows of some. */
-static void tell(block *b, int has_patterns, ptrdiff_t t, MASK which, const OF(moved) *did)
+static void tell(block *b, ptrdiff_t t, MASK which, const OF(moved) *did)
 {
     const OF(state) *now = &b->now;
-    const int is_symmetric = b->m->run.is_symmetric != 0.0;
     REAL all[COLUMNS];
     for (int n = 0; n < COLUMNS; n++)
         all[n] = fill(0.0);
@@ -369,17 +425,21 @@ static void tell(block *b, int has_patterns, ptrdiff_t t, MASK which, const OF(m
 
     const OF(pair) x = {now->x[0], now->x[1]};
     MASK is_exact = did->is_exact;
+    const OF(exact) *map = &b->map;
+    if (!b->is_passive && b->has_exact)
+        map = of_flow(now->flow, b->exact, sizeof *b->exact);
     if (any(which & opposite(is_exact))) {
+        const REAL direction = b->is_passive ? fill(1.0) : now->flow;
         REAL *next = moment;
-        if (is_symmetric)
+        if (b->m->run.is_symmetric != 0.0)
             *next++ = did->at->M_F + 0.0;
-        *next++ = has_patterns ? did->at->M_1 + 0.0 : did->at->M_1;
-        *next++ = has_patterns ? did->at->M_2 + 0.0 : did->at->M_2;
+        *next++ = b->has_exact ? did->at->M_1 + 0.0 : direction * did->at->M_1;
+        *next++ = b->has_exact ? did->at->M_2 + 0.0 : direction * did->at->M_2;
         if (b->m->run.has_clutches != 0.0) {
             *next++ = did->at->F_1 + 0.0;
             *next++ = did->at->F_2 + 0.0;
         }
-        if (has_patterns) {
+        if (b->has_exact) {
             const MASK fast = which & opposite(is_exact) & is_fast(&b->k, x);
             if (any(fast))
                 find_ways(b, fast, did->at, now->held[0]);
@@ -388,7 +448,7 @@ static void tell(block *b, int has_patterns, ptrdiff_t t, MASK which, const OF(m
     }
     if (any(which & is_exact))
         for (int n = 0; n < 3; n++)
-            moment[n] = pick(is_exact, response_to(b->map.moments[n], x, now->held), moment[n]);
+            moment[n] = pick(is_exact, response_to(map->moments[n], x, now->held), moment[n]);
     REAL *more = moment + MOMENTS;
     *more++ = now->flow;
     *more++ = now->force[0];
@@ -405,7 +465,7 @@ static REAL given(const double *numbers, ptrdiff_t stride)
 {
     if (!stride)
         return fill(*numbers);
-    REAL all;
+    REAL all = {0};
     for (int n = 0; n < LANES; n++)
         all[n] = numbers[n * stride];
     return all;
@@ -414,7 +474,6 @@ static REAL given(const double *numbers, ptrdiff_t stride)
 static void tick(block *b, ptrdiff_t t)
 {
     const task *of = b->of;
-    const int has_patterns = b->m->run.is_symmetric != 0.0 && b->m->run.has_clutches == 0.0;
     const int substeps = (int)b->m->run.substeps;
     const ptrdiff_t place = t * of->of_tick + b->first * of->of_member;
     OF(state) *now = &b->now;
@@ -434,15 +493,22 @@ static void tick(block *b, ptrdiff_t t)
         S[n] = pressed_friction(is_pressed, b->preload[n], b->f[n], force[n], b->radius[n]);
     MASK left = no_mask(), is_fresh = no_mask();   /* to dm_tick; what was seen */
     for (int n = 0; n < substeps; n++) {
-        flow = flow_of_input(T[0], b->g_F, x[0], b->k.sign_speed, b->deadband, flow);
-        left |= solver_step(b, has_patterns, (OF(pair)){x[0], x[1]}, n ? seen : now->seen, T, S,
-                            &did);
+        const REAL power = input_power(T[0], b->g_F, x[0]);
+        if (b->is_passive) {
+            flow = flow_of_input(power, x[0], b->k.sign_speed, b->deadband, flow);
+        } else {
+            REAL speeds[PORTS];
+            port_speeds_of(b->g_F, b->k_1, b->k_2, x, speeds);
+            flow = flow_of_powers(power, T[1] * speeds[1] + T[2] * speeds[2], b->deadband, flow);
+        }
+        left |= solver_step(b, (OF(pair)){x[0], x[1]}, n ? seen : now->seen, T, S, flow, &did);
         const MASK rest = b->alive & opposite(did.is_exact);
         if (n == 0 && (any(rest) || substeps > 1))
             memcpy(seen, now->seen, sizeof seen);
-        if (any(rest))
+        if (b->is_passive && any(rest)) {
             put(rest, STATE, did.at->state, seen);
-        is_fresh |= rest;
+            is_fresh |= rest;
+        }
         x[0] = did.end.w;
         x[1] = did.end.s;
         turned[0] += did.integral.w;
@@ -460,7 +526,7 @@ static void tick(block *b, ptrdiff_t t)
     if (any(is_fresh))
         put(moved, STATE, seen, now->seen);
     if (of->rows)
-        tell(b, has_patterns, t, moved, &did);
+        tell(b, t, moved, &did);
     for (int n = 0; any(opposite(moved)) && n < LANES; n++) {
         if (!moved[n]) {
             store_state(b, n);

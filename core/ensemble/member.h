@@ -40,8 +40,9 @@ patterns *dm_known_of(member *);
 void dm_member_tick(const task *, ptrdiff_t n, ptrdiff_t t);
 
 /*
- * Advance LANES members, of which n is the first, by all ticks of a task, under the passive law
- * and without the lag; the bits are those of dm_member_tick.
+ * Advance 2, 4 or 8 members, of which n is the first, by all ticks of a task; the bits are those
+ * of dm_member_tick. Not for lagged friction, nor a symmetric one with clutches under the paper's
+ * law.
  */
 typedef void stepper(const task *, ptrdiff_t n);
 extern stepper dm_step_2, dm_step_4, dm_step_8;

@@ -32,6 +32,7 @@ TOLERANCE = 1e-4        # rad/s, error estimate allowed in one part
 BACKWARD = 3.0          # times that, for the estimate seen from the end
 SAFETY, SHRINK, GROW = 0.8, 0.1, 5.0
 NEWTON = 30             # steps of Newton's method
+FASTEST = 1e150         # rad/s^2, of which squares are still numbers
 MOST_RESORTS = 1000     # steps of the last resort, which is halved where it finds no solution
 
 
@@ -195,6 +196,7 @@ def step(law, k, u, y, h, tolerance=TOLERANCE, here=None):
         y + q + c (t/h)^3 with q = t phi_1(t J) f, which is d at its end; or, of the last resort,
         a straight line with the slope f. ``here`` and ``there`` are the points at the ends,
         and the integral is that of the path.
+    :raises ArithmeticError: where the motion leaves the range of floating point numbers.
     """
     evaluate, jacobian = law.evaluate, law.jacobian
     w, s = y
@@ -202,6 +204,8 @@ def step(law, k, u, y, h, tolerance=TOLERANCE, here=None):
     left = part = h
     parts = []
     here = here or evaluate(k, u, w, s)
+    if not abs(here[0]) + abs(here[1]) < FASTEST:
+        raise ArithmeticError('beyond the range of floating point numbers')
     J, more = jacobian(k, u, here)
     for _ in range(law.most_trials):
         (d_w, d_s), (i_w, i_s), (c_w, c_s) = rosenbrock_part(law, k, u, w, s, here, J, part)
