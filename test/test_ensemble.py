@@ -6,8 +6,8 @@
 from dataclasses import astuple
 from unittest import mock
 
+from ensembles import ALL, CORE, LANES, runs_by_lanes, sets_of
 import numpy as np
-from properties import random_case
 import pytest
 
 from dm_ros import (
@@ -21,10 +21,7 @@ from dm_ros import (
 from dm_ros.mechanism.sets import possible, table_of
 from dm_ros.motion.models import LOSS_LAWS
 
-in_c = core._chosen('')
-LANES = in_c.LANES if in_c else []   # how many members can share a register
 TICKS = 30
-ALL = ('velocity', 'position', 'moment', 'power_flow', 'clutch_force')
 
 
 @pytest.fixture(params=[*(f'C, {n} at once' for n in LANES), 'Python'])
@@ -32,19 +29,9 @@ def language(request):
     """Do it in this language."""
     language, *lanes = request.param.split()
     language = language.strip(',')
-    with mock.patch.object(core, 'Ticker', in_c.Ticker if lanes else None), \
+    with mock.patch.object(core, 'Ticker', CORE.Ticker if lanes else None), \
             mock.patch('dm_ros.ensemble.lanes_of', lambda _: int(lanes[0])):
         yield language
-
-
-def sets_of(variant, count, clutched=False):
-    """Return random tables of one variant."""
-    n, found = 0, []
-    while len(found) < count:
-        case = random_case(n, clutched)
-        found += [case.arguments['parameters']] * (case.variant == variant)
-        n += 1
-    return found
 
 
 @pytest.mark.parametrize('loss_law', LOSS_LAWS)
@@ -104,29 +91,8 @@ def test_what_is_recorded_is_what_every_tick_reports(variant, clutched, language
 @pytest.mark.parametrize('variant, clutched', [('symmetric_ode', False), ('symmetric_ode', True),
                                                ('lsd_ode', False)])
 def test_how_many_go_at_once_changes_no_bit(variant, clutched, loss_law):
-    count, ticks = 67, 150
-    sets, rng = sets_of(variant, count, clutched), np.random.default_rng(9)
-    # from a creep to full speed, under torques that jump, stay, balance each other or are none
-    start = rng.normal(0, 1, (count, 2)) * 10 ** rng.uniform(-2, 2.5, (count, 1))
-    T = rng.normal(0, 1, (ticks, count, 3)) * 10 ** rng.uniform(-1, 3.5, (count, 1))
-    T[30:] = np.repeat(T[30::20], 20, axis=0)
-    T[:, ::3, 1] = T[:, ::3, 2] = -T[:, ::3, 0] / 2
-    T[80:110] = 0.0
-    T[120:, 5:12] = 1e308
-    runs = []
-    for lanes in LANES:
-        with mock.patch('dm_ros.ensemble.lanes_of', lambda _, lanes=lanes: lanes):
-            ensemble = Ensemble(variant, sets, 0.002, initial_velocity=start, loss_law=loss_law)
-        A = np.random.default_rng(7).uniform(-500, 500, (ticks, count, len(ensemble.clutches)))
-        A = np.maximum(A, 0.0)
-        told = ensemble.run(T[:100], A[:100], record=ALL)
-        for n in range(100, 105):
-            ensemble.step(T[n], A[n])
-        ensemble.run(T[105:], A[105:])
-        runs.append([told[name].tobytes() for name in ALL] + [
-            getattr(ensemble, name).tobytes() for name in (*ALL, 'coarse_steps', 'failed')])
-        assert ensemble.failed.any() and not ensemble.failed.all()
-    assert all(run == runs[0] for run in runs)
+    first, *others = runs_by_lanes(variant, clutched, loss_law, seed=0)
+    assert others and all(run == first for run in others)
 
 
 def test_what_cannot_be_recorded_is_refused_by_name():
