@@ -20,29 +20,21 @@ def initial_velocity(shaft):
 
 
 @dataclass(frozen=True)
-class NodeParameters(Parameters):
+class LoopParameters(Parameters):
     """
-    What the node has beside its mechanism.
+    What a node has whatever it drives.
 
     :raises ValueError: names the parameter, its value and what is allowed.
     """
 
-    variant: str = row('variant', 'symmetric_ode', '', 0, 0, 'the mechanism and its formulation',
-                       kind=str, read_only=True, choices=VARIANTS)
-    loss_law: str = row('loss_law', PASSIVE, '', 0, 0,
-                        'passive: no gear or bearing gives energy back; paper: as it has them',
-                        kind=str, read_only=True, choices=LOSS_LAWS)
     mode: str = row('mode', 'realtime', '', 0, 0,
-                    'what advances time: the clock, or each message on ~/torques by one tick',
+                    'what advances time: the clock, or each grouped message by one tick',
                     kind=str, read_only=True, choices=('realtime', 'lockstep'))
     rate: float = row('rate', 200.0, 'Hz', 0.1, 1e4, 'ticks in a second', read_only=True)
-    substeps: int = row('substeps', 1, '1', 1, 1000, 'solver steps in a tick', kind=int)
     torque_timeout: float = row('torque_timeout', 0.5, 's', 0.0, 1e6,
                                 'a torque older than this becomes zero; 0 holds for ever')
     torque_limit: float = row('torque_limit', 1e5, 'N m', 0.0, 1e9,
                               'larger demands are clamped to this and counted')
-    deadband: float = row('power_flow_deadband', 0.0, 'W', 0.0, 1e9,
-                          'power (paper: difference of powers) within which the index stays')
     real_time_factor: float = row('real_time_factor', 1.0, '1', 0.0, 1e3,
                                   'speed of simulated time against the steady clock',
                                   above_low=True)
@@ -51,12 +43,26 @@ class NodeParameters(Parameters):
     joint_prefix: str = row('joint_prefix', '', '', 0, 0,
                             'before every name in JointState messages, in and out', kind=str,
                             read_only=True, pattern=PREFIX)
-    energy_audit: bool = row('energy_audit', True, '', 0, 0,
-                             'keep the energy balance, for /diagnostics', kind=bool,
-                             read_only=True)
     realtime_priority: int = row('realtime_priority', 0, '1', 0, 99,
                                  'SCHED_FIFO priority of the loop, 0 for none',
                                  kind=int, read_only=True)
+
+
+@dataclass(frozen=True)
+class NodeParameters(LoopParameters):
+    """What the node ``differential`` has beside its mechanism; raises as ``LoopParameters``."""
+
+    variant: str = row('variant', 'symmetric_ode', '', 0, 0, 'the mechanism and its formulation',
+                       kind=str, read_only=True, choices=VARIANTS)
+    loss_law: str = row('loss_law', PASSIVE, '', 0, 0,
+                        'passive: no gear or bearing gives energy back; paper: as it has them',
+                        kind=str, read_only=True, choices=LOSS_LAWS)
+    substeps: int = row('substeps', 1, '1', 1, 1000, 'solver steps in a tick', kind=int)
+    deadband: float = row('power_flow_deadband', 0.0, 'W', 0.0, 1e9,
+                          'power (paper: difference of powers) within which the index stays')
+    energy_audit: bool = row('energy_audit', True, '', 0, 0,
+                             'keep the energy balance, for /diagnostics', kind=bool,
+                             read_only=True)
     initial_left: float = initial_velocity('left')
     initial_right: float = initial_velocity('right')
     initial_front: float = initial_velocity('front')

@@ -65,16 +65,16 @@ class CommandMessage:
     def __init__(self, ports, prefix=''):
         """:param ports: the ``Port`` s whose values it brings; prefix: before each name."""
         self.names = [prefix + port.name for port in ports]
-        self._is_speed = [port.kind == 'speed' for port in ports]
+        self._taken = [port.array for port in ports]
 
     def arrays(self, values):
         """Return the ``Arrays`` of one value for each port, in its unit; None for no speed."""
         numbers = [math.nan if value is None else float(value) for value in values]
-        efforts, velocities = (
-            array('d', [number if is_speed is wanted else math.nan
-                        for number, is_speed in zip(numbers, self._is_speed, strict=True)])
-            for wanted in (False, True))
-        return Arrays(EMPTY, velocities if any(self._is_speed) else EMPTY, efforts)
+        return Arrays(*[
+            array('d', [number if taken == wanted else math.nan
+                        for number, taken in zip(numbers, self._taken, strict=True)])
+            if wanted == 'effort' or wanted in self._taken else EMPTY
+            for wanted in Arrays._fields])
 
 
 def input_topics(mechanism):

@@ -21,6 +21,8 @@ class Port(NamedTuple):
     low: float    # the least that may come in; infinity itself never may
     high: float = math.inf
     idle: float | None = 0.0   # what holds while nothing comes in
+    array: str = 'effort'      # of a JointState that brings it
+    lasts: bool = False        # whether it holds however old it is
 
     def refusal(self, value):
         """Return why a value must not come in, in words, or None."""
@@ -41,7 +43,7 @@ def torque(shaft):
 
 def speed(shaft):
     """Return the port of an outside speed, by an elastic shaft; it is free without any."""
-    return Port(shaft, 'speed', 'rad/s', -1e6, 1e6, idle=None)
+    return Port(shaft, 'speed', 'rad/s', -1e6, 1e6, idle=None, array='velocity')
 
 
 def force(clutch):

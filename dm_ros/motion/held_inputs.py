@@ -6,11 +6,15 @@
 from typing import NamedTuple, Sequence
 
 
-class Joints(NamedTuple):
-    """The arrays of a JointState; what there is no speed port for is not looked at."""
+NOUNS = {'effort': 'effort', 'velocity': 'speed', 'position': 'position'}
 
-    efforts: Sequence
-    velocities: Sequence
+
+class Joints(NamedTuple):
+    """The arrays of a JointState; those that no port takes are not looked at."""
+
+    effort: Sequence
+    velocity: Sequence = ()
+    position: Sequence = ()
 
 
 class HeldInputs:
@@ -38,7 +42,8 @@ class HeldInputs:
         self.received = self.refused = self.clamped = 0
         self._index = {name: i for i, name in enumerate(self.names)}
         self._prefixed = {prefix + name: name for name in self.names} if prefix else None
-        self._speeds = {port.name for port in ports if port.kind == 'speed'}
+        self._arrays = [array for array in Joints._fields
+                        if array == 'effort' or array in [port.array for port in ports]]
         self.forget()
 
     def forget(self):
@@ -51,8 +56,8 @@ class HeldInputs:
         """
         Take a demand for some ports at a tick; return ``(port, limit)`` where it was clamped.
 
-        :param values: for each name, or ``Joints``: where there are speed ports each of its
-            arrays holds NaN, or is empty, where the other counts.
+        :param values: for each name, or ``Joints``: where ports take several of its arrays,
+            each holds NaN, or is empty, where another counts.
         :param sparse: whether NaN stands for no demand: the port keeps the older one, and its age.
         :raises ValueError: says why the demand is refused; the older one stays.
         """
@@ -70,13 +75,15 @@ class HeldInputs:
         if not self.timeout:
             return tuple(self._demand)
         oldest = tick - self.timeout
-        return tuple([port.idle if arrival is None or arrival < oldest else value
-                      for port, value, arrival in zip(self.ports, self._demand, self._arrival)])
+        return tuple([
+            port.idle if arrival is None or arrival < oldest and not port.lasts else value
+            for port, value, arrival in zip(self.ports, self._demand, self._arrival)])
 
     def stale(self, tick):
         """Return the names of the ports whose demand is too old."""
-        return [name for name, arrival in zip(self.names, self._arrival)
-                if self.timeout and arrival is not None and arrival < tick - self.timeout]
+        return [port.name for port, arrival in zip(self.ports, self._arrival)
+                if self.timeout and arrival is not None and arrival < tick - self.timeout
+                and not port.lasts]
 
     def silent(self):
         """Return the names of the ports that never had a demand."""
@@ -88,41 +95,46 @@ class HeldInputs:
                 raise ValueError(f'{name!r} is not one of {", ".join(self._prefixed)}')
         return [self._prefixed[name] for name in names]
 
-    def _mismatch(self, names, what, values):
+    def _mismatch(self, names, array, values):
         """Return why an array of a message is refused, and what to do about it."""
         known = self._prefixed or self._index
-        others = [name for name in names if name not in known] if what == 'efforts' else ()
-        return (f'{len(names)} names but {len(values)} {what}: each name needs one, NaN for no '
+        others = [name for name in names if name not in known] if array == 'effort' else ()
+        plural = {'effort': 'efforts', 'velocity': 'velocities', 'position': 'positions'}[array]
+        return (f'{len(names)} names but {len(values)} {plural}: each name needs one, NaN for no '
                 f'command{", but leave out " * bool(others)}{", ".join(others)}; in ros2_control '
-                f'declare a command interface {"effort" if what == "efforts" else "velocity"} for '
-                'each joint of the system, and joints without in a system of their own')
+                f'declare a command interface {array} for each joint of the system, and joints '
+                'without in a system of their own')
 
-    def _of_kinds(self, names, efforts, velocities):
-        """Return one value for each name, the one that its port takes."""
+    def _of_arrays(self, names, joints):
+        """Return one value for each name, from the array that its port takes."""
         for name in names:
             if name not in self._index:
                 raise ValueError(f'{name!r} is not one of {", ".join(self.names)}')
-        kinds = [name in self._speeds for name in names]
-        for what, values, needed in (('efforts', efforts, False),
-                                     ('velocities', velocities, True)):
-            if len(values) != len(names) and (len(values) or needed in kinds):
-                raise ValueError(self._mismatch(names, what, values))
+        taken = [self.ports[self._index[name]].array for name in names]
+        for array in self._arrays:
+            values = getattr(joints, array)
+            if len(values) != len(names) and (len(values) or array in taken):
+                raise ValueError(self._mismatch(names, array, values))
         values = []
-        for i, (name, is_speed) in enumerate(zip(names, kinds)):
-            takes, other = (velocities, efforts) if is_speed else (efforts, velocities)
-            if len(other) and other[i] == other[i]:   # not NaN
-                raise ValueError(f'{name} takes {"a speed" if is_speed else "no speed"}, its '
-                                 f'{"effort" if is_speed else "velocity"} must be NaN')
-            values.append(takes[i])
+        for i, (name, array) in enumerate(zip(names, taken)):
+            for other in self._arrays:
+                numbers = getattr(joints, other)
+                if other != array and len(numbers) and numbers[i] == numbers[i]:   # not NaN
+                    raise ValueError(f'{name} takes '
+                                     f'{f"no {NOUNS[other]}" if array == "effort" else ""}'
+                                     f'{f"a {NOUNS[array]}" if array != "effort" else ""}'
+                                     f', its {other} must be NaN')
+            values.append(getattr(joints, array)[i])
         return values
 
     def _take(self, names, values, tick, sparse):
         if isinstance(values, Joints):
-            if not self._speeds and len(names) != len(values.efforts):
-                raise ValueError(self._mismatch(names, 'efforts', values.efforts))
+            only_efforts = len(self._arrays) == 1
+            if only_efforts and len(names) != len(values.effort):
+                raise ValueError(self._mismatch(names, 'effort', values.effort))
             if self._prefixed:
                 names = self._without_prefix(names)
-            values = (self._of_kinds(names, *values) if self._speeds else values.efforts)
+            values = values.effort if only_efforts else self._of_arrays(names, values)
         if len(names) != len(values):
             raise ValueError(f'{len(names)} names but {len(values)} values')
         if len(set(names)) != len(names):

@@ -58,7 +58,7 @@ class Inputs:
 
     def take_grouped(self, message, info, stamp=0):
         """Let the plant take a message of ``~/torques``; return whether it was taken."""
-        taken = self._plant.take(message.name, Joints(message.effort, message.velocity),
+        taken = self._plant.take(message.name, Joints(message.effort, message.velocity, message.position),
                                  '~/torques', stamp, sparse=True)
         if taken:
             self.sources.note(self._plant.inputs.commanded, True,
