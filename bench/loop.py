@@ -153,7 +153,8 @@ def node(rate, variant, path, model=''):
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.parameter import Parameter
 
-    from dm_ros.ros.node import DifferentialNode, SWITCH_INTERVAL
+    from dm_ros.ros.driven_node import SWITCH_INTERVAL
+    from dm_ros.ros.node import DifferentialNode
     rclpy.init()
     differential = DifferentialNode(parameter_overrides=[
         Parameter('variant', value=variant), Parameter('rate', value=float(rate))])

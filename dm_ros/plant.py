@@ -1,75 +1,17 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""
-What advances: a simulation with what was demanded of it, what is refused, and what it says of it.
-
-The node gives a ``Plant`` to a loop, and topics and services to the loop; a test or another
-program drives it by the same methods. It knows no ROS, no clock and no thread: all its methods but
-``prepared`` belong between two ticks.
-"""
+"""A differential as the node ``differential`` drives it."""
 
 import math
 from typing import NamedTuple
 
-from dm_ros.motion.energy import AuditedSimulation, given_back
-from dm_ros.motion.held_inputs import HeldInputs
+from dm_ros.driven import Condition, Driven
+from dm_ros.files.published import input_topics
+from dm_ros.motion.energy import AuditedSimulation, given_back, rated_efficiency
 from dm_ros.motion.models import PAPER
 from dm_ros.motion.simulation import NO_FORCE, Simulation
 from dm_ros.settings import make_simulation, NodeParameters, port_parameters, speed_ports
-
-
-class Condition:
-    """
-    Something that should not be: counted, logged when it begins and when it has ended.
-
-    It is ``active`` until a second without it. The log is slower to say that it is over, so that
-    one that comes and goes takes two lines, and not two in every second.
-    """
-
-    QUIET = 10   # s without it, after which the log says that it is over
-
-    def __init__(self, what, log):
-        """:param what: in words, such as ``ticks are missed``; log: has ``warning``, ``info``."""
-        self.what = what
-        self.count = 0
-        self.reason = ''
-        self.active = False
-        self._log = log
-        self._settled = self._before = self._quiet = 0
-        self._told = False   # in the log that it has begun, and not yet that it is over
-
-    def __str__(self):
-        return f'{self.what}: {self.reason}'
-
-    def happened(self, reason, times=1):
-        """Count it, and log it if it begins now."""
-        self.count += times
-        self.reason = reason
-        self.active = True
-        if not self._told:
-            self._told = True
-            self._log.warning(str(self))
-
-    def settle(self):
-        """End it if it did not happen since the last call; to be called at 1 Hz."""
-        self._quiet = self._quiet + 1 if self.count == self._settled else 0
-        if self._quiet:
-            self.active = False
-        if self._told and self._quiet >= self.QUIET:
-            self._tell('over')
-        self._settled = self.count
-
-    def end(self):
-        """Tell what was since it began, if that is not over; when nothing more will happen."""
-        if self._told:
-            self._tell('at the end')
-
-    def _tell(self, when):
-        self._told = False
-        times = self.count - self._before
-        self._log.info(f'{when}: {self.what} ({times} times since it began)')
-        self._before = self.count
 
 
 class Prepared(NamedTuple):
@@ -80,9 +22,12 @@ class Prepared(NamedTuple):
     model: tuple | None   # of ``Simulation.prepare``; None where the mechanism stays as it is
 
 
-class Plant:
+class Plant(Driven):
     """
     A differential as the node runs it.
+
+    Its ports are the shafts that take a torque, N m, or a speed, rad/s, and the clutches that take
+    an axial force, N, by the names of their moments.
 
     :param values: ``{full name: value}`` of the parameters that differ from their defaults.
     :param log: has ``warning`` and ``info``; conditions are logged there.
@@ -90,87 +35,46 @@ class Plant:
     """
 
     def __init__(self, values, log):
-        self.settings = settings = NodeParameters().changed(NodeParameters.part_of(values))
-        self.simulation = make_simulation(
+        settings = NodeParameters().changed(NodeParameters.part_of(values))
+        simulation = make_simulation(
             settings.variant, values,
             kind=AuditedSimulation if settings.energy_audit else Simulation)
-        mechanism = self.simulation.mechanism
+        mechanism = simulation.mechanism
+        super().__init__(settings, simulation, mechanism.ports + mechanism.actuators,
+                         input_topics(mechanism), log)
         self.ports = port_parameters(mechanism.inputs, values)
-        self.inputs = HeldInputs(mechanism.ports + mechanism.actuators, (), 0.0,
-                                 settings.joint_prefix)
+        self.driving = mechanism.inputs
         self._shafts = len(mechanism.ports)
-        self.ticks = 0   # in all, also refused ones and those before a reset
-        self.refusing = Condition('messages are refused', log)
-        self.clamping = Condition('demands are clamped', log)
-        self.stale = Condition('demands are too old and count as zero', log)
         self.freed = Condition('speeds are too old and their shafts are free', log)
-        self.out_of_range = Condition('ticks are refused', log)
-        self.coarse = Condition('solver steps are coarse', log)
         self.motoring = Condition('gears and bearings give energy back, as motors', log)
         self.reset()
         self.adopt(self.prepared({}))
 
     @property
-    def lockstep(self):
-        """Whether each demand brings its own tick."""
-        return self.settings.mode == 'lockstep'
+    def title(self):
+        """What it is, in a word."""
+        return self.simulation.variant
 
     @property
-    def values(self):
-        """``{full name: value}`` of all parameters, its own and those of its mechanism."""
-        return {name: value for table in self._tables for name, value in table.named().items()}
+    def words(self):
+        """What the log tells of it at the start, in parts."""
+        mechanism = self.simulation.mechanism
+        inputs = {'torques': [port.name for port in mechanism.ports if port.kind == 'torque'],
+                  'speeds': mechanism.half_shafts, 'forces': mechanism.clutches}
+        return [f'{self.settings.loss_law} law of losses', f'steps in {self.simulation.language}',
+                *(f'{kind} on {", ".join(names)}' for kind, names in inputs.items() if names)]
 
     @property
     def _tables(self):
         return self.settings, self.simulation.parameters, *self.ports.values()
 
-    def take(self, names, values, what, stamp=0, sparse=False):
-        """
-        Take a demand for some ports, whole or not at all; return whether it was taken.
-
-        The ports are the shafts that take a torque, N m, or a speed, rad/s, and the clutches that
-        take an axial force, N, by the names of their moments.
-
-        :param values: for each name, or ``Joints``, see ``HeldInputs.demand``.
-        :param what: what brought it, in words.
-        :param stamp: ns, in which demands must follow one another; 0 for none.
-        :param sparse: whether NaN stands for no demand, else it is refused.
-        """
-        if stamp and stamp <= self._last_stamp:
-            self.inputs.refused += 1
-            self.refusing.happened(f'{what}: its stamp repeats or goes back in time')
-            return False
-        try:
-            if clamped := self.inputs.demand(names, values, self.simulation.ticks, sparse):
-                limits = dict.fromkeys(f'{limit:g} {port.unit}' for port, limit in clamped)
-                self.clamping.happened(f'{what}: beyond {", ".join(limits)}')
-        except ValueError as error:
-            self.refusing.happened(f'{what}: {error}')
-            return False
-        self._last_stamp = stamp or self._last_stamp
-        return True
-
-    def tick(self):
-        """
-        Advance one tick under the inputs in force and return the ``Snapshot``.
-
-        A tick that would lead out of the range of numbers is refused and counted: the state stays.
-        """
-        held, shafts = self.inputs.in_force(self.simulation.ticks), self._shafts
-        forces = held[shafts:]
-        self.ticks += 1
-        try:
-            return self.simulation.step(held[:shafts], forces if any(forces) else NO_FORCE)
-        except ValueError as error:
-            self.out_of_range.happened(str(error))
-            return self.simulation.snapshot()
+    def _step(self, held):
+        forces = held[self._shafts:]
+        return self.simulation.step(held[:self._shafts], forces if any(forces) else NO_FORCE)
 
     def reset(self):
         """Go back to the start, without any demand; parameters stay."""
-        self.simulation.reset()
-        self.inputs.forget()
-        self._last_stamp = 0
-        self._coarse_before = 0
+        super().reset()
         self._books_before = self._books()
 
     def prepared(self, changes):
@@ -182,13 +86,7 @@ class Plant:
         :param changes: ``{full name: value}``.
         :raises ValueError: names the parameter, its value and what is allowed.
         """
-        rows = {name: row for table in self._tables for name, row in table.rows().values()}
-        before = self.values
-        for name, value in changes.items():
-            if name not in rows:
-                raise ValueError(f'{name}: there is no such parameter')
-            if rows[name].read_only and value != before[name]:
-                raise ValueError(f'{name}: it cannot be changed while it runs')
+        changes = self.checked(changes)
         settings = self.settings.changed(self.settings.part_of(changes))
         mechanism = self.simulation.parameters.part_of(changes)
         ports = {shaft: table.changed(table.part_of(changes))
@@ -208,39 +106,66 @@ class Plant:
         simulation.power_flow_deadband = settings.deadband
         simulation.initial_velocity = settings.initial_velocity(simulation.outputs)
         limit = {'torque': settings.torque_limit, 'speed': math.inf}
-        self.inputs.limits = (*(limit[port.kind] for port in simulation.mechanism.ports),
-                              *simulation.force_limits)
-        # in lockstep time stands still without torques, so none is too old
-        self.inputs.timeout = 0.0 if self.lockstep else settings.torque_timeout * settings.rate
+        self.limit((*(limit[port.kind] for port in simulation.mechanism.ports),
+                    *simulation.force_limits))
 
     def notice(self):
         """Notice what is not noticed where it happens; to be called at 1 Hz."""
-        coarse = self.simulation.coarse_steps
-        if coarse > self._coarse_before:
-            self.coarse.happened('their work reached its bound', coarse - self._coarse_before)
-        self._coarse_before = coarse
-        free = set(self.simulation.mechanism.half_shafts)
-        stale = self.inputs.stale(self.simulation.ticks)
-        for condition, names in ((self.stale, [name for name in stale if name not in free]),
-                                 (self.freed, [name for name in stale if name in free])):
-            if names:
-                condition.happened(', '.join(names))
+        super().notice()
         before, self._books_before = self._books_before, self._books()
         if self._books_before and (energy := given_back(before, self._books_before)):
             self.motoring.happened(
                 f"{energy:.3g} J since the last report: the paper's law of losses does that where "
                 'power does not run all one way; loss_law: passive does not')
 
-    def settle(self):
-        """Let the conditions end that are over; to be called at 1 Hz, after ``notice``."""
-        for condition in self.conditions:
-            condition.settle()
+    def told_of_loop(self):
+        """Return ``{key: value}`` of what is driven, for diagnostics."""
+        return {'variant': self.simulation.variant, **super().told_of_loop()}
+
+    def told_of_inputs(self):
+        """Return ``{key: value}`` of the forces of the actuators, for diagnostics."""
+        simulation = self.simulation
+        return {f'force on {clutch.name} [N]': f'{force:g}' for clutch, force in zip(
+            simulation.mechanism.actuators, simulation.state.force)}
+
+    def told_of_energy(self):
+        """Return complaints and ``{key: value}`` of the energy, for diagnostics, None without."""
+        simulation = self.simulation
+        if not isinstance(simulation, AuditedSimulation):
+            return None
+        total, worst, simulation.worst = simulation.total, simulation.worst, 0.0
+        efficiency, motoring = simulation.tick.efficiency, self.motoring
+        return [str(motoring)] if motoring.active else [], {
+            'worst balance residual since the last report [relative]': f'{worst:.1e}',
+            'work of the torques [J]': f'{sum(total.work):.6g}',
+            'stored [J]': f'{simulation.stored_energy:.6g}',
+            'lost by drag [J]': f'{total.viscous:.6g}',
+            'lost in gears and bearings [J]': f'{sum(total.gears) + sum(total.bearings):.6g}',
+            'lost in clutches [J]': f'{sum(total.clutches):.6g}',
+            **({'lost in half-shafts [J]': f'{sum(total.half_shafts):.6g}'}
+               if total.half_shafts else {}),
+            'taken by the error of the step [J]': f'{total.numerical:.3g}',
+            'rated efficiency': f'{rated_efficiency(simulation.parameters):.6g}',
+            'measured efficiency': 'none' if efficiency is None else f'{efficiency:.6g}',
+            **{f'{name} gave back [J]': f'{part.energy:.6g} in {part.ticks} ticks'
+               for name, part in simulation.returned.items()}}
+
+    def _notice_stale(self, names):
+        free = set(self.simulation.mechanism.half_shafts)
+        for condition, some in ((self.stale, [name for name in names if name not in free]),
+                                (self.freed, [name for name in names if name in free])):
+            if some:
+                condition.happened(', '.join(some))
+
+    @property
+    def of_inputs(self):
+        """Those conditions that are of demands."""
+        return *super().of_inputs, self.freed
 
     @property
     def conditions(self):
         """All that should not be and may be."""
-        return (self.refusing, self.clamping, self.stale, self.freed, self.out_of_range,
-                self.coarse, self.motoring)
+        return *super().conditions, self.motoring
 
     def _books(self):
         """Return all that was lost under the law whose losses may be gains, None if it is not."""

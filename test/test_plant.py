@@ -8,11 +8,12 @@ import math
 import pytest
 
 from dm_ros import Simulation, VARIANTS
+from dm_ros.driven import Condition
 from dm_ros.energy import Energy
 from dm_ros.mechanism.variants import SYMMETRIC, variant_named
 from dm_ros.motion.energy import given_back, Layout
 from dm_ros.motion.models import LOSS_LAWS
-from dm_ros.plant import Condition, Plant
+from dm_ros.plant import Plant
 
 NAMES = {'symmetric': ('pinion', 'left', 'right'), 'lsd': ('carrier', 'front', 'rear')}
 

@@ -5,7 +5,6 @@
 
 from typing import NamedTuple, Sequence
 
-
 NOUNS = {'effort': 'effort', 'velocity': 'speed', 'position': 'position'}
 
 

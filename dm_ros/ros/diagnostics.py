@@ -8,8 +8,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
-from dm_ros.motion.energy import AuditedSimulation, rated_efficiency
-from dm_ros.plant import Condition
+from dm_ros.driven import Condition
 from dm_ros.ros.graph import in_words
 
 
@@ -59,9 +58,12 @@ class Diagnostics:
         plant = self._node.plant
         self._count_missed()
         plant.notice()
-        statuses = [self._loop(), self._torques(), self._connections()]
-        if isinstance(plant.simulation, AuditedSimulation):
-            statuses.append(self._energy())
+        statuses = [self._loop(), self._inputs(), self._connections()]
+        with self._node.control.lock:   # one and the same tick
+            energy = plant.told_of_energy()
+        if energy:
+            complaints, values = energy
+            statuses.append(self._status('energy', complaints, 'fine', values))
         plant.settle()
         for condition in self._conditions:
             condition.settle()
@@ -94,8 +96,7 @@ class Diagnostics:
         return self._status(
             'loop', active(self.waiting, self.driven, self.set_back, self.missing, plant.coarse,
                            plant.out_of_range), running, {
-                'variant': plant.simulation.variant,
-                'steps in': plant.simulation.language,
+                **plant.told_of_loop(),
                 'rate wanted [Hz]': f'{1.0 / plant.simulation.dt:g}',
                 'rate held [Hz]': f'{(ticks - ticks_before) / (now - before) * 1e9:.2f}',
                 **lateness_values(pacer.take_lateness()),
@@ -117,19 +118,16 @@ class Diagnostics:
             self.waiting.happened(f'use_sim_time is set, and {names} publishes it')
         return {'/clock driven by': names}
 
-    def _torques(self):
+    def _inputs(self):
         plant = self._node.plant
-        inputs, simulation = plant.inputs, plant.simulation
-        silent, stale = inputs.silent(), inputs.stale(simulation.ticks)
-        mechanism = simulation.mechanism
-        without = {port.kind: [other.name for other in mechanism.ports + mechanism.actuators
+        inputs = plant.inputs
+        silent, stale = inputs.silent(), inputs.stale(plant.simulation.ticks)
+        without = {port.kind: [other.name for other in inputs.ports
                                if other.kind == port.kind and other.name in silent]
-                   for port in mechanism.ports + mechanism.actuators}
-        shafts = [name for name in silent if name in simulation.inputs]
-        forces = zip(simulation.mechanism.actuators, simulation.state.force)
+                   for port in inputs.ports}
         return self._status(
-            'torques', active(plant.refusing, plant.clamping, plant.stale, plant.freed),
-            'no torque yet' if len(shafts) == len(simulation.inputs) else 'fine', {
+            plant.grouped, active(*plant.of_inputs),
+            'fine' if set(plant.driving) - set(silent) else 'no torque yet', {
                 'received messages': inputs.received,
                 'refused messages': inputs.refused,
                 'last refused': plant.refusing.reason or 'none',
@@ -137,7 +135,7 @@ class Diagnostics:
                 'stale': ', '.join(stale) or 'none',
                 **{f'without any {kind} yet': ', '.join(names) or 'none'
                    for kind, names in without.items()},
-                **{f'force on {clutch.name} [N]': f'{force:g}' for clutch, force in forces}})
+                **plant.told_of_inputs()})
 
     def _connections(self):
         misfits = '; '.join(f'{t}: {what}' for t, what in self._node.neighbours.misfits().items())
@@ -162,28 +160,6 @@ class Diagnostics:
                 'commanded by several sources': contested or 'none',
                 'topics that nobody hears': unheard or 'none',
                 'other nodes of the same name': namesakes})
-
-    def _energy(self):
-        simulation = self._node.simulation
-        with self._node.control.lock:   # one and the same tick
-            total, worst, simulation.worst = simulation.total, simulation.worst, 0.0
-            stored, efficiency = simulation.stored_energy, simulation.tick.efficiency
-            returned = dict(simulation.returned)
-        motoring = self._node.plant.motoring
-        return self._status('energy', [str(motoring)] if motoring.active else [], 'fine', {
-            'worst balance residual since the last report [relative]': f'{worst:.1e}',
-            'work of the torques [J]': f'{sum(total.work):.6g}',
-            'stored [J]': f'{stored:.6g}',
-            'lost by drag [J]': f'{total.viscous:.6g}',
-            'lost in gears and bearings [J]': f'{sum(total.gears) + sum(total.bearings):.6g}',
-            'lost in clutches [J]': f'{sum(total.clutches):.6g}',
-            **({'lost in half-shafts [J]': f'{sum(total.half_shafts):.6g}'}
-               if total.half_shafts else {}),
-            'taken by the error of the step [J]': f'{total.numerical:.3g}',
-            'rated efficiency': f'{rated_efficiency(simulation.parameters):.6g}',
-            'measured efficiency': 'none' if efficiency is None else f'{efficiency:.6g}',
-            **{f'{name} gave back [J]': f'{part.energy:.6g} in {part.ticks} ticks'
-               for name, part in returned.items()}})
 
 
 def active(*conditions):

@@ -10,7 +10,6 @@ from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import qos_check_compatible, qos_policy_name_from_kind, QoSCompatibility
 
 UNKNOWN = '_NODE_NAME_UNKNOWN_'   # as rmw has it
-INPUTS = '~/torques/', '~/torque/', '~/speed/', '~/clutch/'   # what its topics begin with, then /
 
 
 class Neighbours:
@@ -22,8 +21,9 @@ class Neighbours:
     subscription it would tell too, but then each message would wake the executor.
     """
 
-    def __init__(self, node):
-        self._node = node
+    def __init__(self, node, inputs):
+        """:param inputs: what the topics of inputs begin with, such as ``~/torque/``."""
+        self._node, self._inputs = node, inputs
         self._told = {}      # {topic: policy}
         self._watched = {}
         self.heard = {}      # {topic: message type} of the inputs of the node
@@ -60,7 +60,8 @@ class Neighbours:
         shaft in lockstep, and messages of another type.
         """
         node, wrong = self._node, {}
-        own = tuple(node.get_fully_qualified_name() + part.removeprefix('~') for part in INPUTS)
+        me = node.get_fully_qualified_name()
+        own = tuple(me + part.removeprefix('~') for part in self._inputs)
         heard = self.heard_topics()
         for topic, types in node.get_topic_names_and_types():
             if topic in heard:

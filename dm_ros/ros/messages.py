@@ -42,24 +42,25 @@ class SnapshotMessages:
     """
     The messages of a tick, reused from tick to tick.
 
-    ``joints`` maps the last word of each topic, in the order of publication, to its JointState.
+    ``of_a_tick`` maps the last word of each topic, in the order of publication, to its message.
     """
 
     def __init__(self, mechanism, prefix):
         """:param mechanism: its ``Mechanism``; prefix: before each name."""
         self._published = published = Published(mechanism, prefix)
-        self.joints = {topic: JointState(name=names) for topic, names in published.names.items()}
-        self.power_flow = Int8()
-        for message in self.joints.values():
+        self._joints = {topic: JointState(name=names) for topic, names in published.names.items()}
+        self._power_flow = Int8()
+        self.of_a_tick = {**self._joints, 'power_flow': self._power_flow}
+        for message in self._joints.values():
             message.header.frame_id = published.frame
 
     def fill(self, snapshot, seconds, nanoseconds):
         """Put a snapshot and one stamp into the messages, in place."""
         arrays = self._published.arrays(snapshot)
-        for message, (position, velocity, effort) in zip(self.joints.values(), arrays):
+        for message, (position, velocity, effort) in zip(self._joints.values(), arrays):
             message.position[:] = position
             message.velocity[:] = velocity
             message.effort[:] = effort
             stamp = message.header.stamp
             stamp.sec, stamp.nanosec = seconds, nanoseconds
-        self.power_flow.data = snapshot.power_flow
+        self._power_flow.data = snapshot.power_flow

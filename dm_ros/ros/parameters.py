@@ -63,15 +63,17 @@ def declare(node, table, given, mine):
     return started
 
 
-def strictly_checked(name, value):
+def strictly_checked(rows, name, value):
     """
     Return a value for a parameter, checked with the types of ROS 2; raise as ``declare`` does.
 
+    :param rows: ``{full name: Row}`` of the parameters that are checked here.
+
     ``ros2 param`` makes a string of ``4e-05``, which a parameter file takes as a double.
     """
-    if name not in known_rows():
+    if name not in rows:
         return value
-    entry = known_rows()[name]
+    entry = rows[name]
     if entry.kind is float and isinstance(value, str) and WITH_EXPONENT.fullmatch(value):
         value = float(value)
     return entry.strictly_checked(name, value)

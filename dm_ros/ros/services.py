@@ -3,6 +3,8 @@
 
 """What others may ask of a node: ~/reset, ~/pause, ~/step, and to change its parameters."""
 
+from functools import partial
+
 from rcl_interfaces.msg import SetParametersResult
 from std_srvs.srv import SetBool, Trigger
 
@@ -19,7 +21,7 @@ class Requests:
         node.create_service(Trigger, '~/reset', self.reset)
         node.create_service(SetBool, '~/pause', self.pause)
         node.create_service(Trigger, '~/step', self.step)
-        self.parameters = WholeRequests(node, strictly_checked)
+        self.parameters = WholeRequests(node, partial(strictly_checked, node.plant.rows))
         node.add_on_set_parameters_callback(self._prepare)
         node.add_post_set_parameters_callback(self._adopt)
 

@@ -15,21 +15,23 @@ class Sources:
     """
     The sources of what a node takes.
 
-    The topic of a single port is for one publisher. On ``~/torques`` several nodes may command
+    The topic of a single port is for one publisher. By the grouped one several nodes may command
     different ports, so what counts there is what was received for each port: a message does not
     tell its publisher, but a number, which only grows as long as it is one and the same.
     """
 
-    def __init__(self, ports, single, neighbours):
+    def __init__(self, ports, grouped, single, neighbours):
         """
         Begin without any command.
 
         :param ports: names of all ports, in their order.
+        :param grouped: topic of the messages for many of them.
         :param single: {topic: (port, subscription)} of the topics of single ports.
         :param neighbours: tells who publishes.
         """
         self._ports, self._single, self._neighbours = ports, single, neighbours
-        self._last = [None] * len(ports)   # (whether by ~/torques, number) of the last command
+        self._grouped = grouped
+        self._last = [None] * len(ports)   # (whether it was grouped, number) of the last command
         self._changes = [0] * len(ports)
         self._seen = deque([tuple(self._changes)], WINDOW + 1)
 
@@ -37,7 +39,7 @@ class Sources:
         """
         Note a command; a microsecond in a tick.
 
-        :param ports: by index; is_grouped: whether it came on ``~/torques``.
+        :param ports: by index; is_grouped: whether it came with others.
         :param number: of the message among those of its publisher, None where none is told.
         """
         for port in ports:
@@ -55,7 +57,7 @@ class Sources:
         for index, port in enumerate(self._ports):
             single = [topic for topic, (name, _) in self._single.items() if name == port]
             if self._seen[-1][index] - self._seen[0][index] >= OFTEN:
-                found[port] = self._who([*single, '~/torques'])
+                found[port] = self._who([*single, self._grouped])
             elif any(self._single[topic][1].get_publisher_count() > 1 for topic in single):
                 found[port] = self._who(single)
         return found

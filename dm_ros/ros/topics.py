@@ -1,13 +1,12 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The topics of a node: torques and forces in, speeds and moments out."""
+"""The topics of a node: inputs and what its simulation reports."""
 
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Int8
+from std_msgs.msg import Float64
 
-from dm_ros.files.published import input_topics
 from dm_ros.motion.held_inputs import Joints
 from dm_ros.ros.messages import (
     LATEST_QOS,
@@ -17,7 +16,6 @@ from dm_ros.ros.messages import (
     OUTPUT_QOS,
     Polled,
     SHARED_QOS,
-    SnapshotMessages,
 )
 from dm_ros.ros.privates import poll
 from dm_ros.ros.sources import Sources
@@ -35,15 +33,15 @@ class Inputs:
             node.neighbours.heard[topic] = f'{package}/{kind}/{message_type.__name__}'
             return node.create_subscription(message_type, topic, never_called, qos,
                                             callback_group=polled)
-        mechanism = plant.simulation.mechanism
         self._single = [] if plant.lockstep else [
             (f'~/{topic}', port, subscription(Float64, f'~/{topic}', LATEST_QOS))
-            for topic, port in input_topics(mechanism).items()]
-        self.torques = subscription(JointState, '~/torques',
+            for topic, port in plant.single_topics.items()]
+        self._topic = f'~/{plant.grouped}'
+        self.grouped = subscription(JointState, self._topic,
                                     LOCKSTEP_INPUT_QOS if plant.lockstep else SHARED_QOS)
         if plant.lockstep:   # in real time publishers of all kinds are heard
-            node.neighbours.watch('~/torques', 'RELIABILITY')
-        self.sources = Sources(plant.inputs.names, {
+            node.neighbours.watch(self._topic, 'RELIABILITY')
+        self.sources = Sources(plant.inputs.names, self._topic, {
             topic: (port, subscription) for topic, port, subscription in self._single},
             node.neighbours)
 
@@ -53,38 +51,39 @@ class Inputs:
             for message, _ in poll(subscription):
                 if self._plant.take((port,), (message.data,), topic):
                     self.sources.note(self._plant.inputs.commanded, False, None)
-        for message, info in poll(self.torques):
+        for message, info in poll(self.grouped):
             self.take_grouped(message, info)
 
     def take_grouped(self, message, info, stamp=0):
-        """Let the plant take a message of ``~/torques``; return whether it was taken."""
-        taken = self._plant.take(message.name, Joints(message.effort, message.velocity, message.position),
-                                 '~/torques', stamp, sparse=True)
+        """Let the plant take a message of many inputs; return whether it was taken."""
+        joints = Joints(message.effort, message.velocity, message.position)
+        taken = self._plant.take(message.name, joints, self._topic, stamp, sparse=True)
         if taken:
             self.sources.note(self._plant.inputs.commanded, True,
                               info['publication_sequence_number'])
         return taken
 
     def discard(self):
-        """Drop all waiting messages on ``~/torques``; return their number."""
-        return sum(1 for _ in poll(self.torques))
+        """Drop all waiting messages of many inputs; return their number."""
+        return sum(1 for _ in poll(self.grouped))
 
 
 class Outputs:
-    """The publishers of a node's snapshots."""
+    """
+    The publishers of a node's snapshots.
 
-    def __init__(self, node):
-        self._node, plant = node, node.plant
-        mechanism, settings = plant.simulation.mechanism, plant.settings
-        qos = LOCKSTEP_OUTPUT_QOS if plant.lockstep else OUTPUT_QOS
-        self._messages = messages = SnapshotMessages(mechanism, settings.joint_prefix)
-        self.of_a_tick = [   # in the order of publication
-            *((node.publisher(JointState, f'~/{topic}', qos), message)
-              for topic, message in messages.joints.items()),
-            (node.publisher(Int8, '~/power_flow', qos), messages.power_flow)]
+    :param messages: has ``of_a_tick``, ``{topic: message}`` in the order of publication, the first
+        a JointState, and ``fill(snapshot, seconds, nanoseconds)``.
+    """
+
+    def __init__(self, node, messages):
+        self._node, self._messages, settings = node, messages, node.plant.settings
+        qos = LOCKSTEP_OUTPUT_QOS if node.plant.lockstep else OUTPUT_QOS
+        self.of_a_tick = [(node.publisher(type(message), f'~/{topic}', qos), message)
+                          for topic, message in messages.of_a_tick.items()]
         self.joint_states, self._joint_states = self.of_a_tick[0]
         self.clock = node.publisher(Clock, '/clock', qos) if settings.publish_clock else None
-        self._simulated_stamps = plant.lockstep or settings.publish_clock
+        self._simulated_stamps = node.plant.lockstep or settings.publish_clock
 
     def publish(self, snapshot, stamp=None):
         """

@@ -171,7 +171,7 @@ def test_nodes_that_command_different_shafts_are_fine(ros, nodes, mode):
 
 
 def test_a_source_that_is_replaced_or_starts_anew_fights_with_nobody():
-    sources = Sources(['left'], {}, None)
+    sources = Sources(['left'], '~/torques', {}, None)
     for number in (7, 8, 1, 2):
         sources.note([0], True, number)
         assert sources.contested() == {}
