@@ -1,0 +1,227 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Wheels with brakes and tyres, and the body that they carry."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dm_ros.driveline import brake, tyre
+from dm_ros.driveline.body import Body, G, slope
+from dm_ros.driveline.state import places
+
+
+class Given(NamedTuple):
+    """What is held in a tick, as the equations need it."""
+
+    torque: float     # N m, on the input
+    brakes: tuple     # N m, capacity of each
+    steer: float      # rad
+    grade: float      # tangent
+    grip: tuple
+    contact: tuple
+    wind: float       # m/s, from ahead
+
+
+class RoadPoint(NamedTuple):
+    """What is known of wheels and body at one state."""
+
+    omega: list      # rad/s^2, of the wheels
+    pads: list       # 1/s, dy/dt
+    kappa: list      # 1/s, dkappa/dt
+    alpha: list
+    body: tuple      # m/s^2, (rad/s^2), of (v_x, v_y, r)
+    force: tuple     # m/s^2, the specific force (f_x, f_y)
+    A: tuple         # m/s^3, of the lagged one
+    loads: list      # N
+    mu: list         # (mu, mu per newton)
+    tyres: list      # ``tyre.contact``
+    brakes: list     # (T_cap, T/T_cap, lost/T_cap)
+    drag: float      # N
+
+
+class Road:
+    """
+    Wheels and body of an ``Assembly``.
+
+    :param layout: of the state; planar: whether the body moves sideways and yaws too.
+    """
+
+    def __init__(self, assembly, layout, planar):
+        p = self._p = assembly.vehicle
+        self._layout, self._planar = layout, planar
+        self.wheels = tuple(assembly.wheels)
+        self._body = Body(p, self.wheels)
+        self._tyre = tyre.coefficients(p)
+        self._brake = p.pad, p.c_b, p.w_low
+        self._carcass = tyre.Carcass(self._tyre)
+        self._none = [0.0] * len(self.wheels)
+        self._steer = None
+
+    def _turn(self, steer):
+        """Prepare for a steering angle; it is kept until there is another."""
+        self._frames = self._body.frames(steer)
+        self._steer, self._rows = steer, None
+
+    def at(self, x, load, given):
+        """
+        Return the ``RoadPoint`` at a state.
+
+        :param load: torques of the shafts on the wheels, N m; given: ``Given``.
+        """
+        if given.steer != self._steer:
+            self._turn(given.steer)
+        p, k, layout = self._p, self._tyre, self._layout
+        v_x, v_y, r = self.twist(x)
+        A_x, A_y = self._lagged(x)
+        sine, cosine = slope(given.grade)
+        loads = self._body.loads(A_x, A_y, cosine, given.contact)
+        F_x = F_y = M_z = 0.0
+        omegas, pads, kappas, alphas, mus, tyres, brakes = [], [], [], [], [], [], []
+        for (c, s, X, Y), omega, y, kappa, alpha, F_z, torque, capacity, grip in zip(
+                self._frames, x[layout.wheels], x[layout.pads], x[layout.kappa],
+                x[layout.alpha] or self._none, loads, load, given.brakes, given.grip):
+            mu = tyre.friction(k, grip, F_z)
+            contact = tyre.contact(k, mu[0], F_z, kappa, alpha, p.R * omega,
+                                   c * v_x + s * v_y + X * r, c * v_y - s * v_x + Y * r)
+            T_cap = capacity + p.C_rr * F_z * p.R
+            share, rate, lost = brake.friction(*self._brake, omega, y)
+            along, across = contact[0], contact[1]
+            F_x += c * along - s * across
+            F_y += s * along + c * across
+            M_z += X * along + Y * across
+            omegas.append((torque - p.R * along - T_cap * share) / p.I_w)
+            pads.append(rate)
+            kappas.append(contact[2])
+            alphas.append(contact[3])
+            mus.append(mu)
+            tyres.append(contact)
+            brakes.append((T_cap, share, lost))
+        drag, _ = self._body.drag(v_x, given.wind)
+        f_x, f_y = (F_x - drag) / p.m, F_y / p.m
+        if self._planar:
+            body = f_x - G * sine + r * v_y, f_y - r * v_x, M_z / p.I_z
+            A = (f_x - A_x) / p.load_time, (f_y - A_y) / p.load_time
+        else:
+            body, A, alphas = (f_x - G * sine,), ((f_x - A_x) / p.load_time,), []
+        return RoadPoint(omegas, pads, kappas, alphas, body, (f_x, f_y), A, loads, mus, tyres,
+                         brakes, drag)
+
+    def twist(self, x):
+        """Return (v_x, v_y, r)."""
+        body = x[self._layout.body]
+        return body if self._planar else (body[0], 0.0, 0.0)
+
+    def _lagged(self, x):
+        A = x[self._layout.A]
+        return A if self._planar else (A[0], 0.0)
+
+    # -- Jacobian: what the state does to each contact, the contacts to the rates, and the rest --
+
+    def _lay_out_jacobian(self):
+        layout, p = self._layout, self._p
+        n, count = len(layout), len(self.wheels)
+        inner, outer = np.zeros((count, 5, n)), np.zeros((n, count, 4))
+        body, A = places(layout.body), places(layout.A)
+        for w, (c, s, X, Y) in enumerate(self._frames):
+            omega, kappa = places(layout.wheels)[w], places(layout.kappa)[w]
+            inner[w, 0, kappa], inner[w, 2, omega], inner[w, 3, body[0]] = 1.0, p.R, c
+            outer[omega, w, 0], outer[kappa, w, 2] = -p.R / p.I_w, 1.0
+            outer[body[0], w, :2] = c / p.m, -s / p.m
+            outer[A[0], w, :2] = c / (p.m * p.load_time), -s / (p.m * p.load_time)
+            if self._planar:
+                alpha = places(layout.alpha)[w]
+                inner[w, 1, alpha] = outer[alpha, w, 3] = 1.0
+                inner[w, 3, body[1:]], inner[w, 4, body] = (s, X), (-s, c, Y)
+                outer[body[1], w, :2], outer[body[2], w, :2] = (s / p.m, c / p.m), (
+                    X / p.I_z, Y / p.I_z)
+                outer[A[1], w, :2] = s / (p.m * p.load_time), c / (p.m * p.load_time)
+        return inner, outer.reshape(n, 4 * count)
+
+    def own_places(self):
+        """Return (row, column) of what ``slopes`` returns first."""
+        layout, body = self._layout, places(self._layout.body)
+        own = [entry for w, y in zip(places(layout.wheels), places(layout.pads))
+               for entry in ((w, w), (w, y), (y, w), (y, y))]
+        own += [(body[0], body[0]), (places(layout.A)[0], body[0])]
+        if self._planar:
+            own += [(body[0], body[1]), (body[0], body[2]), (body[1], body[0]),
+                    (body[1], body[2])]
+        return own
+
+    def slopes(self, x, point, given):
+        """
+        Return the slopes at ``own_places``, and 20 of each contact, see ``tyre.slopes``.
+
+        The latter stand between ``geometry``. What the state A does is left out.
+        """
+        p, k, layout = self._p, self._tyre, self._layout
+        v_x, v_y, r = self.twist(x)
+        own, contacts = [], []
+        for (c, s, X, _), omega, y, kappa, alpha, F_z, mu, contact, pads in zip(
+                self._frames, x[layout.wheels], x[layout.pads], x[layout.kappa],
+                x[layout.alpha] or self._none, point.loads, point.mu, point.tyres, point.brakes):
+            share_w, share_y, rate_w, rate_y = brake.slopes(*self._brake, omega, y)
+            per = -pads[0] / p.I_w
+            own += (per * share_w, per * share_y, rate_w, rate_y)
+            contacts += tyre.slopes(k, mu[0], F_z, kappa, alpha, p.R * omega,
+                                    c * v_x + s * v_y + X * r, contact)
+        _, drag_v = self._body.drag(v_x, given.wind)
+        own += (-drag_v / p.m, -drag_v / (p.m * p.load_time))
+        if self._planar:
+            own += (r, v_y, -r, -v_x)
+        return own, contacts
+
+    def geometry(self, steer):
+        """Return contacts per state (wheels, 5, n) and rates per contact (n, 4 wheels)."""
+        if steer != self._steer:
+            self._turn(steer)
+        if self._rows is None:
+            self._rows = self._lay_out_jacobian()
+        return self._rows
+
+    # -- books --
+
+    def rolling(self, v_x, grade, n):
+        """Set the state of wheels and body to rolling freely with v_x on a grade, in x (n,)."""
+        layout = self._layout
+        x = [0.0] * n
+        for place in places(layout.wheels):
+            x[place] = v_x / self._p.R
+        for place in places(layout.pads):
+            x[place] = 1.0 if v_x > 0.0 else -1.0 if v_x < 0.0 else 0.0
+        x[layout.body.start], x[layout.A.start] = v_x, G * slope(grade)[0]
+        return x
+
+    def books(self, x, point, given):
+        """
+        Return what the books need.
+
+        :return: the energy of wheels, brakes, tyres and body, J; by how much that of tyres and
+            brakes grows with their load alone, W; what each tyre takes by slip and by damping,
+            each brake, each rolling resistance and the drag, W.
+        """
+        p, layout = self._p, self._layout
+        v_x, v_y, r = self.twist(x)
+        energy = 0.5 * (p.m * (v_x * v_x + v_y * v_y) + p.I_z * r * r)
+        A, rates = self._lagged(x), point.A if self._planar else (point.A[0], 0.0)
+        load_rates = self._body.load_rates(*A, *rates, slope(given.grade)[1], given.contact)
+        parametric = 0.0
+        slips, dampings, brakes, rollings = [], [], [], []
+        for omega, y, kappa, alpha, F_z, rate, (mu, mu_slope), contact, capacity, (
+                T_cap, _, lost) in zip(
+                    x[layout.wheels], x[layout.pads], x[layout.kappa],
+                    x[layout.alpha] or self._none, point.loads, load_rates, point.mu,
+                    point.tyres, given.brakes, point.brakes):
+            stored, per_load = self._carcass.energy(mu, mu_slope, F_z, contact[10], contact[11])
+            pads = 0.5 * p.pad * y * y
+            energy += stored + T_cap * pads + 0.5 * p.I_w * omega * omega
+            parametric += (per_load + p.C_rr * p.R * pads) * rate
+            slip, damping = tyre.lost_powers(mu, F_z, kappa, alpha, contact)
+            slips.append(slip)
+            dampings.append(damping)
+            brakes.append(capacity * lost)
+            rollings.append((T_cap - capacity) * lost)
+        return energy, parametric, [*slips, *dampings, *brakes, *rollings,
+                                    point.drag * (v_x + given.wind)]
