@@ -126,6 +126,11 @@ class Driveline:
         return MappingProxyType(self._assembly.parameters())
 
     @property
+    def parameter_rows(self):
+        """``{full name: Row}`` of all parameters: unit, range, description."""
+        return self._assembly.rows()
+
+    @property
     def time(self):
         """Simulated time, s."""
         return self.ticks * self.dt
