@@ -49,7 +49,7 @@ class System:
 
     def at(self, x):
         """Return the ``Point`` at a state."""
-        return self.equations.at(list(map(float, x)), self.friction, self.given)
+        return self.equations.at(np.array(x, float), self.friction, self.given)
 
     def rates(self, x):
         """Return dx/dt."""
@@ -57,12 +57,12 @@ class System:
 
     def jacobian(self, x):
         """Return df/dx in closed form."""
-        return self.equations.jacobian(self.at(x), self.friction, self.given)
+        return self.equations.jacobian(self.at(x), self.given)
 
     def books(self, x):
         """Return the energy, what changes of load add to it, and all losses."""
         point = self.at(x)
-        energy, lost = self.equations.train.books(point.x, point.train, self.friction)
+        energy, lost = self.equations.train.books(point.x, point.train)
         more, parametric, others = self.equations.road.books(point.x, point.road, self.given)
         return energy + more, parametric, np.array(lost + others)
 

@@ -60,9 +60,8 @@ class Body:
     def __init__(self, p, wheels):
         self._p, self._wheels = p, wheels
         ends = [wheel.is_front for wheel in wheels]
-        # of the load of its end, and of what goes from left to right, the part of each wheel
-        self._parts = [(wheel.is_front, 1.0 / ends.count(wheel.is_front),
-                        (-2.0 if wheel.y > 0.0 else 2.0) / ends.count(wheel.is_front))
+        # of each wheel: its part of its side, and which: rear left and right, front left and right
+        self._parts = [(2.0 / ends.count(wheel.is_front), 2 * wheel.is_front + (wheel.y < 0.0))
                        for wheel in wheels]
 
     def frames(self, steer):
@@ -84,9 +83,10 @@ class Body:
         lateral = p.m * A_y * p.h / p.track
         to_front = min(max(lateral * p.roll_share, -0.5 * front), 0.5 * front)
         to_rear = min(max(lateral * (1.0 - p.roll_share), -0.5 * rear), 0.5 * rear)
-        return [share * (part * front + side * to_front if is_front
-                         else part * rear + side * to_rear)
-                for share, (is_front, part, side) in zip(contact, self._parts)]
+        loads = (0.5 * rear - to_rear, 0.5 * rear + to_rear,
+                 0.5 * front - to_front, 0.5 * front + to_front)
+        return [share * part * loads[place]
+                for share, (part, place) in zip(contact, self._parts)]
 
     def load_rates(self, A_x, A_y, rate_x, rate_y, cosine, contact):
         """Return what ``loads`` change by in time, N/s, with the rates of A, m/s^3."""
@@ -95,17 +95,16 @@ class Body:
         front = p.m * (G * cosine * p.b - A_x * p.h) / p.L
         front_rate = -p.m * rate_x * p.h / p.L if 0.0 < front < weight else 0.0
         front = min(max(front, 0.0), weight)
-        rates = {}
-        for is_front, axle, axle_rate, roll in (
-                (True, front, front_rate, p.roll_share),
-                (False, weight - front, -front_rate, 1.0 - p.roll_share)):
+        rates = []
+        for axle, axle_rate, roll in ((weight - front, -front_rate, 1.0 - p.roll_share),
+                                      (front, front_rate, p.roll_share)):
             lateral = p.m * A_y * p.h / p.track * roll
-            if abs(lateral) < 0.5 * axle:
-                rates[is_front] = axle_rate, p.m * rate_y * p.h / p.track * roll
-            else:
-                rates[is_front] = axle_rate, 0.5 * axle_rate * (1.0 if lateral > 0.0 else -1.0)
-        return [share * (part * rates[is_front][0] + side * rates[is_front][1])
-                for share, (is_front, part, side) in zip(contact, self._parts)]
+            to_right = p.m * rate_y * p.h / p.track * roll
+            if abs(lateral) > 0.5 * axle:
+                to_right = 0.5 * axle_rate if lateral > 0.0 else -0.5 * axle_rate
+            rates += (0.5 * axle_rate - to_right, 0.5 * axle_rate + to_right)
+        return [share * part * rates[place]
+                for share, (part, place) in zip(contact, self._parts)]
 
     def drag(self, v_x, wind):
         """Return the drag, N, and what it grows with per v_x, N s/m."""

@@ -44,7 +44,8 @@ class Energy(NamedTuple):
 class Account(NamedTuple):
     """What the books know of one state."""
 
-    train: tuple        # J, [W]: energy and losses of the train
+    train: tuple        # what ``Train.books`` and
+    road: tuple         # ``Road.books`` returned
     energy: float       # J, of all
     powers: np.ndarray  # W: input, gravity, wind, parametric, each loss
 
@@ -65,13 +66,13 @@ class Books:
             *[f'{wheel}_{loss}' for loss in ('slip', 'tyre_damping', 'brake', 'rolling')
               for wheel in wheels], 'drag')
 
-    def start(self, point, friction, given):
+    def start(self, point, given):
         """Begin at a ``Point``."""
-        self._point, self._account = point, self._of(point, friction, given)
+        self._point, self._account = point, self._of(point, given)
         self._initial, self._jumps = self._account.energy, 0.0
         self._integrals = np.zeros(NOT_LOST + len(self.names))
 
-    def note(self, first, points, friction, given, h):
+    def note(self, first, points, given, h):
         """
         Book a tick.
 
@@ -80,11 +81,12 @@ class Books:
         """
         account = self._account
         if first is not self._point:
-            known = account.train if first.train is self._point.train else None
-            before, account = account, self._of(first, friction, given, known)
+            before, account = account, self._of(
+                first, given, account.train if first.train is self._point.train else None,
+                account.road if first.road is self._point.road else None)
             self._jumps += account.energy - before.energy
         for point in points:
-            before, account = account, self._of(point, friction, given)
+            before, account = account, self._of(point, given)
             self._integrals += (0.5 * h) * (before.powers + account.powers)
         self._point, self._account = points[-1], account
 
@@ -107,12 +109,12 @@ class Books:
             work_input, gravity, wind, stored, lost, parametric, self._jumps,
             work_input + gravity + wind + parametric + self._jumps - stored - lost)
 
-    def _of(self, point, friction, given, known=None):
+    def _of(self, point, given, of_train=None, of_road=None):
         train, road = self._equations.train, self._equations.road
         x = point.x
-        turning, lost = known or train.books(x, point.train, friction)
-        energy, parametric, lost_on_road = road.books(x, point.road, given)
+        turning, lost = of_train = of_train or train.books(x, point.train)
+        energy, parametric, lost_on_road = of_road = of_road or road.books(x, point.road, given)
         v_x, _, _ = road.twist(x)
-        return Account((turning, lost), turning + energy, np.array([
+        return Account(of_train, of_road, turning + energy, np.array([
             given.torque * x[0], -self._weight * slope(given.grade)[0] * v_x,
             point.road.drag * given.wind, parametric, *lost, *lost_on_road]))

@@ -3,6 +3,7 @@
 
 """A differential as an element of a driveline: the passive law between three flanges."""
 
+from operator import itemgetter
 from types import SimpleNamespace
 
 from dm_ros.mechanism import clutched, elimination, passive
@@ -37,16 +38,17 @@ class Differential:
         k = self.k = passive.coefficients(p, bool(mechanism.clutches))
         if not (elimination.is_finite(p, k) and passive.has_solutions(k)):
             raise no_solution(p)
-        self.ratio = k.g_F or 1.0   # of the input shaft to the carrier
+        self.ratio = k.g_F or 1.0   # speed of the input shaft over that of the carrier
         self.k_1, self.k_2 = k.k_1, k.k_2
         self._spin = k.k_2 / p.g_2s
         self._preload = clutched.full_friction(p)[1] if mechanism.clutches else (0.0, 0.0)
         outputs, clutches = mechanism.outputs, mechanism.clutches
         losses = ('drag', 'final_drive', *[f'{output}_mesh' for output in outputs],
                   'pinion_bearing', 'carrier_bearing', *[f'{output}_clutch' for output in outputs])
-        self._losses = [n for n, loss in enumerate(losses) if (
+        mine = [n for n in range(len(losses)) if (
             n in (0, 2, 3, 5) or (n in (1, 4) and k.g_F) or (n in (6, 7) and clutches))]
-        self.losses = tuple([f'{name}_{losses[n]}' for n in self._losses])
+        self.losses = tuple([f'{name}_{losses[n]}' for n in mine])
+        self._losses = itemgetter(*mine)
 
     def friction(self, forces):
         """Return (S_1, S_2), N m: friction at full slip of preload and axial forces, N."""
@@ -54,12 +56,8 @@ class Differential:
             return self._preload
         return clutched.actuated(self.parameters, self._preload, forces)
 
-    def port_speeds(self, w, s):
-        """Return the speeds of input shaft and outputs, rad/s, in the order of ``ports``."""
-        return self.ratio * w, w + self.k_1 * s, w - self.k_2 * s
-
     def port_rows(self):
-        """Return what the speeds of the ports grow with, per w and per s."""
+        """Return what the speeds of the ``ports`` grow with, per w and per s."""
         return (self.ratio, 0.0), (1.0, self.k_1), (1.0, -self.k_2)
 
     def all_speeds(self, w, s):
@@ -69,19 +67,9 @@ class Differential:
             return w, w + self.k_1 * s, w - self.k_2 * s, self.k.g_F * w, spin
         return w, w + self.k_1 * s, w - self.k_2 * s, spin
 
-    def point(self, T, S, w, s):
-        """Return the ``passive`` point under the torques T on the ports, N m."""
-        return passive.evaluate(self.k, (*T, *S), w, s)
-
-    def slopes(self, T, S, point):
-        """Return what (dw/dt, ds/dt) grow with: per w and s (4,), and per torque (2, 3)."""
-        u = (*T, *S)
-        return passive.jacobian(self.k, u, point)[0], passive.torque_slopes(self.k, u, point)
-
-    def lost_powers(self, T, S, point):
-        """Return what each of ``losses`` takes, W."""
-        lost = passive.lost_powers(self.k, (*T, *S), point)
-        return [lost[n] for n in self._losses]
+    def lost_powers(self, u, point):
+        """Return what each of ``losses`` takes, W, at a ``passive`` point under what is held."""
+        return self._losses(passive.lost_powers(self.k, u, point))
 
     def internal_moments(self, point):
         """Return the ``moments``, N m."""

@@ -73,6 +73,7 @@ class Driveline:
         layout(assembly)
         assembly.finish()
         self._assembly, self._differentials = assembly, tuple(assembly.differentials)
+        self._actuators = tuple([a for d in self._differentials for a in d.actuators])
         self._equations = Equations(assembly, planar)
         self._stepper = Stepper(self._equations, self.dt, assembly.numerics)
         self._books = Books(self._equations, assembly)
@@ -138,7 +139,7 @@ class Driveline:
     @property
     def clutch_force(self):
         """Axial force on each clutch in the last tick, N, in the order of ``clutches``."""
-        return tuple([force for forces in self._forces for force in forces])
+        return self._forces
 
     @property
     def parts(self):
@@ -179,15 +180,15 @@ class Driveline:
                         f'a tangent in [-{STEEPEST:g}, {STEEPEST:g}]')
         self.ticks, self._parts = 0, 1
         self._given = self._inputs.idle(grade)
-        self._forces = [(0.0,) * len(d.clutches) for d in self._differentials]
-        self._friction = [d.friction(f) for d, f in zip(self._differentials, self._forces)]
+        self._forces = (0.0,) * len(self.clutches)
+        self._friction = self._friction_under(self._forces)
         self._flows = (DIRECT,) * len(self._differentials)
         x = self._equations.rolling(speed, grade)
         self._turned = [0.0] * self._equations.layout.speeds.stop
         self._pose = 0.0, 0.0, 0.0
         self._point = self._equations.at(x, self._friction, self._given)
         self._stepper.reset()
-        self._books.start(self._point, self._friction, self._given)
+        self._books.start(self._point, self._given)
 
     def step(self, torque=0.0, brakes=None, clutch_forces=MappingProxyType({}), steer=0.0,
              grade=0.0, grip=None, contact=None, wind=0.0):
@@ -219,16 +220,17 @@ class Driveline:
 
     def _tick(self, given, commands):
         point, friction, forces = self._point, self._friction, self._forces
-        followed = [tuple([actuator.follow(force, command) for actuator, force, command
-                           in zip(d.actuators, now, told)])
-                    for d, now, told in zip(self._differentials, forces, commands)]
+        followed = tuple([actuator.follow(force, command) for actuator, force, command
+                          in zip(self._actuators, forces, commands)])
         if followed != forces:
-            friction = [d.friction(f) for d, f in zip(self._differentials, followed)]
-            point = self._equations.at(point.x, friction, given)
+            friction = self._friction_under(followed)
+            point = self._equations.at(point.array, friction, given)
         elif given != self._given:
-            point = self._equations.at(point.x, friction, given, point.train)
+            same_road = given._replace(torque=self._given.torque) == self._given
+            point = self._equations.at(point.array, friction, given, point.train,
+                                       point.road if same_road else None)
         flows = tuple([self._flow(*of_one) for of_one in zip(
-            self._differentials, point.train.torques, self._equations.layout.differentials,
+            self._differentials, point.train.held, self._equations.layout.differentials,
             self._flows)])
         points = self._stepper.tick(point, friction, given)
         h = self.dt / len(points)
@@ -239,16 +241,25 @@ class Driveline:
                       for angle, u, v in zip(turned, before[speeds], end.x[speeds])]
             pose = self._moved(pose, before, end.x, h)
             before = end.x
-        self._books.note(point, points, friction, given, h)
+        self._books.note(point, points, given, h)
         self._point, self._friction, self._forces = points[-1], friction, followed
         self._given, self._flows, self._turned, self._pose = given, flows, turned, pose
         self._parts = len(points)
         self.ticks += 1
 
-    def _flow(self, differential, torques, place, last):
+    def _friction_under(self, forces):
+        """Return the friction of each differential under the forces on all clutches, N."""
+        friction, first = [], 0
+        for differential in self._differentials:
+            last = first + len(differential.clutches)
+            friction.append(differential.friction(forces[first:last]))
+            first = last
+        return friction
+
+    def _flow(self, differential, held, place, last):
         """Return who drives a differential, as ``losses`` has it; nothing depends on it."""
         w = self._point.x[place]
-        return who_drives(torques[0] * differential.ratio * w,
+        return who_drives(held[0] * differential.ratio * w,
                           abs(w) > differential.k.sign_speed, 0.0, last)
 
     def _moved(self, pose, before, after, h):
@@ -262,7 +273,7 @@ class Driveline:
 
     def snapshot(self):
         """Return the ``Snapshot`` of the last tick, or of the start under no inputs."""
-        x, _, train, road = self._point
+        x, _, _, train, road = self._point
         layout = self._equations.layout
         alpha = x[layout.alpha] or (0.0,) * len(road.loads)
         return Snapshot(
@@ -271,7 +282,7 @@ class Driveline:
             tuple([moment for d, point in zip(self._differentials, train.points)
                    for moment in d.internal_moments(point)]),
             self._flows, tuple(zip(x[layout.kappa], alpha)),
-            tuple([contact[:2] for contact in road.tyres]), tuple(road.loads), self._pose,
+            tuple([contact[:2] for _, _, contact in road.tyres]), tuple(road.loads), self._pose,
             tuple(self._equations.road.twist(x)), road.force)
 
     def _all_shafts(self, x):

@@ -16,6 +16,7 @@ class Point(NamedTuple):
     """All that is known at one state."""
 
     x: list
+    array: np.ndarray     # x
     rates: np.ndarray     # dx/dt
     train: TrainPoint
     road: RoadPoint
@@ -53,24 +54,26 @@ class Equations:
         self._torques, self._contacts = slice(0, m), slice(m, m + contacts)
         self._outer = None   # the rates per contact that are in place
 
-    def at(self, x, friction, given, train=None):
+    def at(self, array, friction, given, train=None, road=None):
         """
         Return the ``Point`` at a state.
 
-        :param x: list (n,); friction: of each differential; given: ``Given``.
-        :param train: its ``TrainPoint``, where that is known.
+        :param array: (n,); friction: of each differential; given: ``Given``.
+        :param train, road: its ``TrainPoint`` and its ``RoadPoint``, where they are known.
         """
+        x = array.tolist()
         if train is None:
             train = self.train.at(x, friction)
-        road = self.road.at(x, train.load[self.train.wheel_flanges], given)
-        rates = np.array([*self.train.accelerations(given.torque, train), *road.omega,
-                          *train.rates, *road.pads, *road.kappa, *road.alpha, *road.body, *road.A])
-        return Point(x, rates, train, road)
+        if road is None:
+            road = self.road.at(x, train.load[self.train.wheel_flanges], given)
+        rates = np.array(self.train.accelerations(given.torque, train) + road.omega + train.rates
+                         + road.pads + road.kappa + road.alpha + road.body + road.A)
+        return Point(x, array, rates, train, road)
 
-    def jacobian(self, point, friction, given):
+    def jacobian(self, point, given):
         """Return df/dx at a ``Point``, (n, n), at fixed signs and without the columns of A."""
         rates_per, per_state, contacts = self._rates_per, self._per_state, self._contacts
-        of_differentials, of_torques = self.train.slopes(point.train, friction)
+        of_differentials, of_torques = self.train.slopes(point.train)
         of_road, of_contacts = self.road.slopes(point.x, point.road, given)
         inner, outer = self.road.geometry(given.steer)
         if outer is not self._outer:
@@ -91,4 +94,4 @@ class Equations:
                             *range(self.layout.inertias.stop, self.layout.wheels.start)], int)
         rows = self.train.twist_rows
         x[turning] = np.linalg.lstsq(rows[:, turning], -rows @ x, rcond=None)[0]
-        return x.tolist()
+        return x

@@ -5,6 +5,7 @@
 
 from collections.abc import Mapping
 from math import atan, inf, isfinite
+from operator import le
 
 from dm_ros.driveline.assembly import INPUT
 from dm_ros.driveline.road import Given
@@ -26,7 +27,6 @@ class Inputs:
 
     def __init__(self, p, wheels, differentials, planar):
         self._planar = planar
-        self._differentials = differentials
         self._wheels = wheels
         self.clutches = tuple([c for d in differentials for c in d.clutches])
         steer = min(STEER_LIMIT, atan(2.0 * TURNING_POINT * p.L / p.track)) if planar else inf
@@ -43,8 +43,9 @@ class Inputs:
             'wind': (Port('wind', 'head wind', 'm/s', -inf),)}
         self.ports = tuple([port for group in groups.values() for port in group])
         self._arguments = [name for name, group in groups.items() for _ in group]
-        self._ranges = [(port.low, port.high) for port in self.ports]
+        self._low, self._high = zip(*[(port.low, port.high) for port in self.ports])
         self._zeros, self._ones = (0.0,) * len(wheels), (1.0,) * len(wheels)
+        self._open = (0.0,) * len(self.clutches)
 
     def idle(self, grade):
         """Return what holds before anything comes in, but a grade."""
@@ -52,35 +53,27 @@ class Inputs:
 
     def checked(self, torque, brakes, clutch_forces, steer, grade, grip, contact, wind):
         """
-        Return the ``Given`` and, of each differential, the forces on its clutches, N.
+        Return the ``Given`` and the forces on all clutches, N.
 
         :raises ValueError: names what is wrong, its value and what is allowed.
         """
-        count = len(self._wheels)
         brakes = self._for_wheels('brakes', brakes, self._zeros)
         grip = self._for_wheels('grip', grip, self._ones)
         contact = self._for_wheels('contact', contact, self._ones)
-        forces = self._forces(clutch_forces) if clutch_forces else (0.0,) * len(self.clutches)
+        forces = self._forces(clutch_forces) if clutch_forces else self._open
         torque, steer = self._number('torque', torque), self._number('steer', steer)
         grade, wind = self._number('grade', grade), self._number('wind', wind)
         values = (torque, *brakes, *forces, steer, grade, *grip, *contact, wind)
-        if not isfinite(sum(values)):   # as nearly never
+        if not (isfinite(sum(values)) and all(map(le, self._low, values))
+                and all(map(le, values, self._high))):   # as nearly never
             self._refuse(values)
-        for value, (low, high) in zip(values, self._ranges):
-            if not low <= value <= high:
-                self._refuse(values)
         if steer and not self._planar:
             raise ValueError(f'steer: {steer!r} is not allowed, it must be 0: the body cannot '
                              'turn unless it is planar')
-        commands, first = [], 1 + count
-        for differential in self._differentials:
-            last = first + len(differential.clutches)
-            commands.append(values[first:last])
-            first = last
-        return Given(torque, brakes, steer, grade, grip, contact, wind), commands
+        return Given(torque, brakes, steer, grade, grip, contact, wind), forces
 
     def _for_wheels(self, what, values, default):
-        if values is None:
+        if values is None or values is default:
             return default
         try:
             numbers = tuple(map(float, values))
@@ -99,11 +92,13 @@ class Inputs:
                 among = ', '.join(self.clutches)
                 raise ValueError(f'clutch_forces: {name!r} is not one of {among}' if among else
                                  f'clutch_forces: {name!r} is not allowed, there is no clutch')
-        return [self._number(f'clutch_forces: {name}', given.get(name, 0.0))
-                for name in self.clutches]
+        return tuple([self._number(f'clutch_forces: {name}', given.get(name, 0.0))
+                      for name in self.clutches])
 
     @staticmethod
     def _number(what, value):
+        if type(value) is float:
+            return value
         try:
             if not isinstance(value, (bool, str)):
                 return float(value)

@@ -31,13 +31,12 @@ class RoadPoint(NamedTuple):
     pads: list       # 1/s, dy/dt
     kappa: list      # 1/s, dkappa/dt
     alpha: list
-    body: tuple      # m/s^2, (rad/s^2), of (v_x, v_y, r)
+    body: list       # m/s^2, (rad/s^2), of (v_x, v_y, r)
     force: tuple     # m/s^2, the specific force (f_x, f_y)
-    A: tuple         # m/s^3, of the lagged one
+    A: list          # m/s^3, of the lagged one
     loads: list      # N
-    mu: list         # (mu, mu per newton)
-    tyres: list      # ``tyre.contact``
-    brakes: list     # (T_cap, T/T_cap, lost/T_cap)
+    tyres: list      # (mu, mu per newton, ``tyre.contact``)
+    brakes: list     # (T_cap, lost/T_cap)
     drag: float      # N
 
 
@@ -57,6 +56,7 @@ class Road:
         self._brake = p.pad, p.c_b, p.w_low
         self._carcass = tyre.Carcass(self._tyre)
         self._none = [0.0] * len(self.wheels)
+        self._parts = self._lay_out_jacobian()
         self._steer = None
 
     def _turn(self, steer):
@@ -73,40 +73,40 @@ class Road:
         if given.steer != self._steer:
             self._turn(given.steer)
         p, k, layout = self._p, self._tyre, self._layout
+        R, C_rr, I_w = p.R, p.C_rr, p.I_w
         v_x, v_y, r = self.twist(x)
         A_x, A_y = self._lagged(x)
         sine, cosine = slope(given.grade)
         loads = self._body.loads(A_x, A_y, cosine, given.contact)
         F_x = F_y = M_z = 0.0
-        omegas, pads, kappas, alphas, mus, tyres, brakes = [], [], [], [], [], [], []
+        omegas, pads, kappas, alphas, tyres, brakes = [], [], [], [], [], []
         for (c, s, X, Y), omega, y, kappa, alpha, F_z, torque, capacity, grip in zip(
                 self._frames, x[layout.wheels], x[layout.pads], x[layout.kappa],
                 x[layout.alpha] or self._none, loads, load, given.brakes, given.grip):
-            mu = tyre.friction(k, grip, F_z)
-            contact = tyre.contact(k, mu[0], F_z, kappa, alpha, p.R * omega,
+            mu, mu_slope = tyre.friction(k, grip, F_z)
+            contact = tyre.contact(k, mu, F_z, kappa, alpha, R * omega,
                                    c * v_x + s * v_y + X * r, c * v_y - s * v_x + Y * r)
-            T_cap = capacity + p.C_rr * F_z * p.R
-            share, rate, lost = brake.friction(*self._brake, omega, y)
-            along, across = contact[0], contact[1]
+            along, across, kappa_rate, alpha_rate = contact[:4]
+            T_cap = capacity + C_rr * F_z * R
+            share, pad_rate, lost = brake.friction(*self._brake, omega, y)
             F_x += c * along - s * across
             F_y += s * along + c * across
             M_z += X * along + Y * across
-            omegas.append((torque - p.R * along - T_cap * share) / p.I_w)
-            pads.append(rate)
-            kappas.append(contact[2])
-            alphas.append(contact[3])
-            mus.append(mu)
-            tyres.append(contact)
-            brakes.append((T_cap, share, lost))
+            omegas.append((torque - R * along - T_cap * share) / I_w)
+            pads.append(pad_rate)
+            kappas.append(kappa_rate)
+            alphas.append(alpha_rate)
+            tyres.append((mu, mu_slope, contact))
+            brakes.append((T_cap, lost))
         drag, _ = self._body.drag(v_x, given.wind)
         f_x, f_y = (F_x - drag) / p.m, F_y / p.m
         if self._planar:
-            body = f_x - G * sine + r * v_y, f_y - r * v_x, M_z / p.I_z
-            A = (f_x - A_x) / p.load_time, (f_y - A_y) / p.load_time
+            body = [f_x - G * sine + r * v_y, f_y - r * v_x, M_z / p.I_z]
+            A = [(f_x - A_x) / p.load_time, (f_y - A_y) / p.load_time]
         else:
-            body, A, alphas = (f_x - G * sine,), ((f_x - A_x) / p.load_time,), []
-        return RoadPoint(omegas, pads, kappas, alphas, body, (f_x, f_y), A, loads, mus, tyres,
-                         brakes, drag)
+            body, A, alphas = [f_x - G * sine], [(f_x - A_x) / p.load_time], []
+        return RoadPoint(omegas, pads, kappas, alphas, body, (f_x, f_y), A, loads, tyres, brakes,
+                         drag)
 
     def twist(self, x):
         """Return (v_x, v_y, r)."""
@@ -120,24 +120,36 @@ class Road:
     # -- Jacobian: what the state does to each contact, the contacts to the rates, and the rest --
 
     def _lay_out_jacobian(self):
+        """
+        Return contacts per state (3, wheels, 5, n) and rates per contact (3, wheels, 4, n).
+
+        Both are [0] + c [1] + s [2] in the ``Frame`` of each wheel, whose X and Y are such too.
+        """
         layout, p = self._layout, self._p
         n, count = len(layout), len(self.wheels)
-        inner, outer = np.zeros((count, 5, n)), np.zeros((n, count, 4))
+        inner, outer = np.zeros((3, count, 5, n)), np.zeros((3, count, 4, n))
         body, A = places(layout.body), places(layout.A)
-        for w, (c, s, X, Y) in enumerate(self._frames):
+        per_force = [(body[0], 1 / p.m), (A[0], 1 / (p.m * p.load_time))]
+        if self._planar:
+            across = [(body[1], 1 / p.m), (A[1], 1 / (p.m * p.load_time))]
+        for w, wheel in enumerate(self.wheels):
             omega, kappa = places(layout.wheels)[w], places(layout.kappa)[w]
-            inner[w, 0, kappa], inner[w, 2, omega], inner[w, 3, body[0]] = 1.0, p.R, c
-            outer[omega, w, 0], outer[kappa, w, 2] = -p.R / p.I_w, 1.0
-            outer[body[0], w, :2] = c / p.m, -s / p.m
-            outer[A[0], w, :2] = c / (p.m * p.load_time), -s / (p.m * p.load_time)
+            inner[0, w, 0, kappa], inner[0, w, 2, omega] = 1.0, p.R
+            outer[0, w, 0, omega], outer[0, w, 2, kappa] = -p.R / p.I_w, 1.0
+            inner[1, w, 3, body[0]], inner[2, w, 4, body[0]] = 1.0, -1.0
+            for place, per in per_force:
+                outer[1, w, 0, place], outer[2, w, 1, place] = per, -per
             if self._planar:
+                x, y = wheel.x, wheel.y
                 alpha = places(layout.alpha)[w]
-                inner[w, 1, alpha] = outer[alpha, w, 3] = 1.0
-                inner[w, 3, body[1:]], inner[w, 4, body] = (s, X), (-s, c, Y)
-                outer[body[1], w, :2], outer[body[2], w, :2] = (s / p.m, c / p.m), (
-                    X / p.I_z, Y / p.I_z)
-                outer[A[1], w, :2] = s / (p.m * p.load_time), c / (p.m * p.load_time)
-        return inner, outer.reshape(n, 4 * count)
+                inner[0, w, 1, alpha] = outer[0, w, 3, alpha] = 1.0
+                inner[1, w, 3:, body[1:]] = (0.0, 1.0), (-y, x)
+                inner[2, w, 3:, body[1:]] = (1.0, 0.0), (x, y)
+                for place, per in across:
+                    outer[2, w, 0, place], outer[1, w, 1, place] = per, per
+                outer[1, w, :2, body[2]] = -y / p.I_z, x / p.I_z
+                outer[2, w, :2, body[2]] = x / p.I_z, y / p.I_z
+        return inner, outer
 
     def own_places(self):
         """Return (row, column) of what ``slopes`` returns first."""
@@ -159,13 +171,13 @@ class Road:
         p, k, layout = self._p, self._tyre, self._layout
         v_x, v_y, r = self.twist(x)
         own, contacts = [], []
-        for (c, s, X, _), omega, y, kappa, alpha, F_z, mu, contact, pads in zip(
+        for (c, s, X, _), omega, y, kappa, alpha, F_z, (mu, _, contact), (T_cap, _) in zip(
                 self._frames, x[layout.wheels], x[layout.pads], x[layout.kappa],
-                x[layout.alpha] or self._none, point.loads, point.mu, point.tyres, point.brakes):
+                x[layout.alpha] or self._none, point.loads, point.tyres, point.brakes):
             share_w, share_y, rate_w, rate_y = brake.slopes(*self._brake, omega, y)
-            per = -pads[0] / p.I_w
+            per = -T_cap / p.I_w
             own += (per * share_w, per * share_y, rate_w, rate_y)
-            contacts += tyre.slopes(k, mu[0], F_z, kappa, alpha, p.R * omega,
+            contacts += tyre.slopes(k, mu, F_z, kappa, alpha, p.R * omega,
                                     c * v_x + s * v_y + X * r, contact)
         _, drag_v = self._body.drag(v_x, given.wind)
         own += (-drag_v / p.m, -drag_v / (p.m * p.load_time))
@@ -178,7 +190,10 @@ class Road:
         if steer != self._steer:
             self._turn(steer)
         if self._rows is None:
-            self._rows = self._lay_out_jacobian()
+            frames = np.array(self._frames)
+            c, s = frames[:, :1, None], frames[:, 1:2, None]
+            inner, outer = [part[0] + c * part[1] + s * part[2] for part in self._parts]
+            self._rows = inner, outer.reshape(-1, len(self._layout)).T
         return self._rows
 
     # -- books --
@@ -209,11 +224,11 @@ class Road:
         load_rates = self._body.load_rates(*A, *rates, slope(given.grade)[1], given.contact)
         parametric = 0.0
         slips, dampings, brakes, rollings = [], [], [], []
-        for omega, y, kappa, alpha, F_z, rate, (mu, mu_slope), contact, capacity, (
-                T_cap, _, lost) in zip(
+        for omega, y, kappa, alpha, F_z, rate, (mu, mu_slope, contact), capacity, (
+                T_cap, lost) in zip(
                     x[layout.wheels], x[layout.pads], x[layout.kappa],
-                    x[layout.alpha] or self._none, point.loads, load_rates, point.mu,
-                    point.tyres, given.brakes, point.brakes):
+                    x[layout.alpha] or self._none, point.loads, load_rates, point.tyres,
+                    given.brakes, point.brakes):
             stored, per_load = self._carcass.energy(mu, mu_slope, F_z, contact[10], contact[11])
             pads = 0.5 * p.pad * y * y
             energy += stored + T_cap * pads + 0.5 * p.I_w * omega * omega

@@ -17,21 +17,30 @@ lost.
 """
 
 
-def torques(k, d, beta, phi, rate):
+def torques(connected, twists, speeds):
     """
-    Return (T_c, T_d), N m.
+    Return (dphi/dt, T_c, T_d) of all shafts, three lists: rad/s, N m, N m.
 
-    :param k, d, beta: N m/rad, N m s/rad, rad; phi: twist, rad; rate: dphi/dt, rad/s.
+    :param connected: of each (k, d, beta, a, b): N m/rad, N m s/rad, rad, and which flanges.
+    :param twists: phi of each, rad; speeds: of all flanges, rad/s.
     """
-    if not beta:
-        return k * phi, d * rate
-    if phi > beta:
-        spring = k * (phi - beta)
-        return spring, min(max(d * rate, -spring), spring)
-    if phi < -beta:
-        spring = k * (phi + beta)
-        return spring, min(max(d * rate, spring), -spring)
-    return 0.0, 0.0
+    rates, springs, dampings = [], [], []
+    for (k, d, beta, a, b), phi in zip(connected, twists):
+        rate = speeds[a] - speeds[b]
+        spring, damping = k * phi, d * rate
+        if beta:
+            if phi > beta:
+                spring = k * (phi - beta)
+                damping = min(max(damping, -spring), spring)
+            elif phi < -beta:
+                spring = k * (phi + beta)
+                damping = min(max(damping, spring), -spring)
+            else:
+                spring = damping = 0.0
+        rates.append(rate)
+        springs.append(spring)
+        dampings.append(damping)
+    return rates, springs, dampings
 
 
 def slopes(k, d, beta, phi, rate):

@@ -68,7 +68,7 @@ class Stepper:
         """
         kept = self._kept
         if kept is None or kept.ticks >= self._jacobian_ticks:
-            kept = Kept(self._equations.jacobian(start, friction, given), {}, 0)
+            kept = Kept(self._equations.jacobian(start, given), {}, 0)
         cut = 0
         while True:
             parts = self._cuts[cut]
@@ -81,7 +81,7 @@ class Stepper:
             while self._cuts[cut] < parts * sqrt(worst) and self._cuts[cut] < self._cuts[-1]:
                 cut += 1
             if kept.ticks:   # it may be too old
-                kept = Kept(self._equations.jacobian(start, friction, given), {}, 0)
+                kept = Kept(self._equations.jacobian(start, given), {}, 0)
         if self._jacobian_ticks:
             self._kept = kept._replace(ticks=kept.ticks + 1)
         return points
@@ -92,15 +92,14 @@ class Stepper:
         point, points = start, []
         for part in range(parts):
             if part and not self._jacobian_ticks:
-                kept = Kept(equations.jacobian(point, friction, given), {}, 0)
+                kept = Kept(equations.jacobian(point, given), {}, 0)
             inverse = kept.inverses.get(parts)
             if inverse is None:
                 inverse = kept.inverses[parts] = np.linalg.inv(
                     self._one - (GAMMA * h) * kept.J)
             k1 = inverse @ point.rates
-            x = h * k1
-            x += point.x
-            k2 = inverse @ (equations.at(x.tolist(), friction, given).rates - 2.0 * k1)
+            x = point.array + h * k1
+            k2 = inverse @ (equations.at(x, friction, given).rates - 2.0 * k1)
             error = (0.5 * h) * (k1 + k2)
             errors = (error * self._per_allowed).tolist()
             worst = max(max(errors), -min(errors))
@@ -110,7 +109,6 @@ class Stepper:
                 return None, float('inf')
             if worst > 1.0 and not is_last:
                 return None, worst
-            x += error   # x + h (3 k1 + k2)/2
-            point = equations.at(x.tolist(), friction, given)
+            point = equations.at(x + error, friction, given)   # x + h (3 k1 + k2)/2
             points.append(point)
         return points, worst

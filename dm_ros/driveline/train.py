@@ -14,6 +14,7 @@ import numpy as np
 
 from dm_ros.driveline import shafts
 from dm_ros.driveline.state import places
+from dm_ros.mechanism.passive import evaluate, jacobian, torque_slopes
 
 
 class TrainPoint(NamedTuple):
@@ -23,7 +24,7 @@ class TrainPoint(NamedTuple):
     springs: list    # N m, T_c of the connections
     damping: list    # N m, T_d of the connections
     load: list       # N m, of all shafts at each flange
-    torques: list    # N m, on the three ports of each differential
+    held: list       # what ``passive.held`` returns, of each differential: torques first
     points: list     # ``passive`` points of the differentials
 
     @property
@@ -46,22 +47,16 @@ class Train:
         self.has_gaps = any(beta for _, _, beta in self.shafts)
         self._layout = layout
         self._places = list(zip(self.differentials, layout.differentials))
-        first = len(self.inertias) + 3 * len(self.differentials)
+        self._differentials = [(d.ratio, d.k_1, d.k_2, d.k, n) for d, n in self._places]
+        self._first = len(self.inertias)   # flange of a differential
+        first = self._first + 3 * len(self.differentials)
         self.wheel_flanges = slice(first, first + len(assembly.wheels))
         names = ([(name, '') for name in assembly.inertias]
                  + [(d.name, port) for d in self.differentials for port in d.ports]
                  + [(wheel.name, '') for wheel in assembly.wheels])
         self._ends = [(names.index(c.a), names.index(c.b)) for c in assembly.connections]
-        self._all = [(k, d, beta, a, b) for (k, d, beta), (a, b) in zip(self.shafts, self._ends)]
+        self._connected = [(*shaft, *ends) for shaft, ends in zip(self.shafts, self._ends)]
         self._lay_out_jacobian(assembly, names)
-
-    def port_speeds(self, x):
-        """Return the speeds of all flanges, rad/s."""
-        layout = self._layout
-        speeds = x[layout.inertias]
-        for differential, n in self._places:
-            speeds += differential.port_speeds(x[n], x[n + 1])
-        return speeds + x[layout.wheels]
 
     def at(self, x, friction):
         """
@@ -69,26 +64,27 @@ class Train:
 
         :param friction: of each differential, as ``Differential.friction`` returned it.
         """
-        speeds = self.port_speeds(x)
+        layout = self._layout
+        speeds = x[layout.inertias]
+        for ratio, k_1, k_2, _, n in self._differentials:
+            w, s = x[n], x[n + 1]
+            speeds += (ratio * w, w + k_1 * s, w - k_2 * s)
+        speeds += x[layout.wheels]
+        rates, springs, dampings = shafts.torques(self._connected, x[layout.twists], speeds)
         load = [0.0] * len(speeds)
-        rates, springs, damping = [], [], []
-        for (k, d, beta, a, b), phi in zip(self._all, x[self._layout.twists]):
-            rate = speeds[a] - speeds[b]
-            T_c, T_d = shafts.torques(k, d, beta, phi, rate)
-            T = T_c + T_d
+        for (_, _, _, a, b), spring, damping in zip(self._connected, springs, dampings):
+            T = spring + damping
             load[a] -= T
             load[b] += T
-            rates.append(rate)
-            springs.append(T_c)
-            damping.append(T_d)
-        torques, points = [], []
-        flange = len(self.inertias)
-        for (differential, n), S in zip(self._places, friction):
-            T = load[flange:flange + 3]
-            torques.append(T)
-            points.append(differential.point(T, S, x[n], x[n + 1]))
+        held, points = [], []
+        flange = self._first
+        for (_, _, _, k, n), (S_1, S_2) in zip(self._differentials, friction):
+            T_in, T_1, T_2 = load[flange:flange + 3]
+            u = T_in, T_1, T_2, S_1, S_2
+            held.append(u)
+            points.append(evaluate(k, u, x[n], x[n + 1]))
             flange += 3
-        return TrainPoint(rates, springs, damping, load, torques, points)
+        return TrainPoint(rates, springs, dampings, load, held, points)
 
     def accelerations(self, torque, point):
         """Return domega/dt of the inertias, the first under the torque, and the differentials."""
@@ -143,16 +139,16 @@ class Train:
         """Return (state, shaft) of the second that ``slopes`` returns."""
         return [(place, shaft) for place, shaft, _, _ in self._entries]
 
-    def slopes(self, point, friction):
+    def slopes(self, point):
         """
         Return the slopes of the differentials: four each at given torques, and per shaft torque.
 
         The other accelerations per shaft torque are ``per_torque``, (n, shafts).
         """
         own, slopes = [], []
-        for differential, T, S, at in zip(self.differentials, point.torques, friction,
-                                          point.points):
-            four, (w, s) = differential.slopes(T, S, at)
+        for (_, _, _, k, _), u, at in zip(self._differentials, point.held, point.points):
+            four, _ = jacobian(k, u, at)
+            w, s = torque_slopes(k, u, at)
             own += four
             slopes += w
             slopes += s
@@ -164,7 +160,7 @@ class Train:
             shafts.slopes(k, d, beta, phi, rate) for (k, d, beta), phi, rate
             in zip(self.shafts, x[self._layout.twists], point.rates)])
 
-    def books(self, x, point, friction):
+    def books(self, x, point):
         """
         Return what the books need.
 
@@ -174,11 +170,10 @@ class Train:
         energy, lost = 0.0, []
         for omega, inertia in zip(x, self.inertias):
             energy += 0.5 * inertia * omega * omega
-        for (differential, n), T, S, at in zip(self._places, point.torques, friction,
-                                               point.points):
+        for (differential, n), u, at in zip(self._places, point.held, point.points):
             (m_11, m_12, m_22), w, s = differential.form, x[n], x[n + 1]
             energy += 0.5 * (m_11 * w * w + m_22 * s * s) + m_12 * w * s
-            lost += differential.lost_powers(T, S, at)
+            lost += differential.lost_powers(u, at)
         for (k, _, _), spring, damping, rate in zip(
                 self.shafts, point.springs, point.damping, point.rates):
             energy += 0.5 * spring * spring / k
