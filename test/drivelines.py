@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from dm_ros import Driveline
 from dm_ros.driveline.assembly import Assembly
@@ -143,3 +144,43 @@ def scenario(name, dt=0.001, duration=None, parameters=()):
     car.reset(speed, grade)
     held = {**held, 'grade': grade} if grade else held
     return car, list(drive(car, held, events, duration or end))
+
+
+def by_radau(name, end):
+    """Return state names, x (n, times) of a stiff solver, rtol 1e-8, and the times."""
+    layout, planar, own, speed, grade, held, events, _ = SCENARIOS[name]
+    system = System(layout, planar, {**sign_speed(layout), **own})
+    inputs = {'torque': 0.0, 'brakes': (0.0,) * 4, 'steer': 0.0, 'grade': grade,
+              'grip': (1.0,) * 4, 'contact': (1.0,) * 4, 'wind': 0.0, **held}
+    events = sorted(((round(t, 9), what, value) for t, what, value in events if t < end),
+                    key=lambda event: event[0])
+    edges = sorted({0.0, end, *[t for t, _, _ in events]})
+    x, times, path = system.equations.rolling(speed, grade), [], []
+    for begin, stop in zip(edges, edges[1:]):
+        for _, what, value in (event for event in events if event[0] == begin):
+            inputs[what] = value
+        system.given = Given(**inputs)
+        ticks = np.arange(round(begin * 1000) + 1, round(stop * 1000) + 1) / 1000.0
+        solution = solve_ivp(lambda _, x: system.rates(x), (begin, stop), x, 'Radau', ticks,
+                             rtol=1e-8, atol=1e-10 * system.layout.scale)
+        assert solution.success
+        x = solution.y[:, -1]
+        times.extend(solution.t)
+        path.append(solution.y)
+    return system.layout, np.hstack(path), np.array(times)
+
+
+def distances(name, end):
+    """Return how far body, wheels, and input and carriers come from a stiff solver."""
+    layout, exact, times = by_radau(name, end)
+    layout_name, planar, own, speed, grade, held, events, _ = SCENARIOS[name]
+    car = Driveline(layout_name, planar, 0.001, {**sign_speed(layout_name), **own})
+    car.reset(speed, grade)
+    run = list(drive(car, {**held, 'grade': grade}, events, end))
+    assert len(run) == len(times)
+    carriers = [n for n, shaft in enumerate(car.shafts) if shaft.endswith('carrier')]
+    return np.array([np.abs(np.array(found).T - exact[place]).max() for found, place in (
+        ([snapshot.twist_body[:1 + 2 * planar] for snapshot in run], layout.body),
+        ([snapshot.velocity[-4:] for snapshot in run], layout.wheels),
+        ([[snapshot.velocity[n] for n in (0, *carriers)] for snapshot in run],
+         [0, *layout.differentials]))])
