@@ -155,22 +155,17 @@ def test_what_the_books_miss_is_of_second_order():
     assert (ratios > 3.3).all() and (ratios < 5.0).all(), errors
 
 
-def pulled_away(**more):
-    """Return the parts of the ticks of pulling away on the level, and the last speed."""
-    car = Driveline('awd', parameters=more)
-    parts = []
-    for _ in drive(car, {}, ramp('torque', 0.0, 300.0, 10, 0.1, 0.2), 0.6):
-        parts.append(car.parts)
-    return parts, car.snapshot().twist_body[0]
-
-
-def test_shafts_a_thousand_times_as_stiff_cost_nothing():
+def test_shafts_a_thousand_times_as_stiff_cost_next_to_nothing():
     stiff = {f'driveline.shaft.{kind}.stiffness': 1000 * value for kind, value in (
         ('input', 3e4), ('front_propeller', 2e4), ('rear_propeller', 1.5e4), ('half', 1e4))}
-    parts, speed = pulled_away()
-    stiff_parts, stiff_speed = pulled_away(**stiff)
-    assert sum(stiff_parts) <= sum(parts)
-    assert stiff_speed == pytest.approx(speed, rel=0.02)
+    layout, planar, own, speed, grade, held, events, _ = SCENARIOS['hill_axle_ice']
+    parts = []
+    for parameters in (own, {**own, **stiff}):
+        car = Driveline(layout, planar, parameters=parameters)
+        car.reset(speed, grade)
+        parts.append([car.parts for _ in drive(car, {**held, 'grade': grade}, events, 2.0)])
+    soft, hard = np.mean(parts, axis=1)
+    assert np.median(parts[1]) == 1 and hard < 1.1 * soft
 
 
 def test_steps_of_ten_milliseconds_stay_stable():

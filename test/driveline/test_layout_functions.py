@@ -3,16 +3,21 @@
 
 """Layouts as pages of elements and connections, the truck of the example, the file of defaults."""
 
+import inspect
 from pathlib import Path
+import re
+import textwrap
 
 from drivelines import drive, example
 import pytest
 import yaml
 
 from dm_ros import Driveline
-from dm_ros.driveline.layouts import four_wheels, half_shafts, INPUT
+from dm_ros.driveline.layouts import four_wheels, half_shafts, INPUT, rwd
 
-CONFIG = Path(__file__).parents[2] / 'config' / 'driveline_awd.yaml'
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / 'config' / 'driveline_awd.yaml'
+PAGE = (ROOT / 'doc' / 'driveline.md').read_text()
 
 
 def flat(tree, prefix=''):
@@ -45,6 +50,18 @@ def test_every_value_of_a_vehicle_is_marked_as_assumed():
         ('driveline.centre.', 'driveline.front.', 'driveline.rear.', 'driveline.max_parts',
          'driveline.jacobian_ticks', 'driveline.tolerance'))]
     assert len(own) == 37 and all('(assumed)' in row.description for row in own)
+
+
+def test_the_layout_on_the_page_is_that_of_the_code():
+    code = inspect.getsource(rwd).replace(f'    """{rwd.__doc__}"""\n', '')
+    assert f'\n\n{textwrap.indent(code, "    ")}\n' in PAGE
+
+
+def test_the_page_names_inputs_and_snapshot_as_they_are():
+    inputs = [name for name in inspect.signature(Driveline.step).parameters if name != 'self']
+    assert re.findall(r'^\| `(\w+)` \| (?:N|rad|1|m/s)', PAGE, re.MULTILINE) == inputs
+    fields = Driveline().snapshot()._fields
+    assert all(f'`{field}`' in PAGE for field in fields if field != 'time')
 
 
 def test_a_truck_shares_its_pull_among_both_driven_axles():
