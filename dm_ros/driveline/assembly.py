@@ -14,11 +14,11 @@ from dm_ros.driveline.differential import Differential
 from dm_ros.driveline.parameters import (
     AxleParameters,
     below,
-    CentreParameters,
     ShaftParameters,
     StepParameters,
     VehicleParameters,
 )
+from dm_ros.mechanism.parameters import SelfLockingParameters
 
 INPUT = 'input'
 
@@ -73,7 +73,7 @@ class Assembly:
         self.inertias[name] = I
         return flange
 
-    def differential(self, name, kind=CentreParameters, **defaults):
+    def differential(self, name, kind=SelfLockingParameters, **defaults):
         """
         Add a differential between axles; return what has its flanges by the names of its ports.
 
@@ -115,12 +115,17 @@ class Assembly:
             name, a, b, self._table(kind(shaft.stiffness, shaft.damping, shaft.gap))))
 
     def finish(self):
-        """Check that it is whole and that all parameters given are some of its own."""
+        """
+        Check that it is whole and that all parameters given are some of its own.
+
+        From now on the input is the first of the inertias.
+        """
         if INPUT not in self.inertias:
             raise ValueError('layout: there is no input')
         for end, words in ((True, 'front'), (False, 'rear')):
             if not any(wheel.is_front == end for wheel in self.wheels):
                 raise ValueError(f'layout: no wheel carries the {words} of the body')
+        self.inertias = {INPUT: self.inertias.pop(INPUT), **self.inertias}
         known = self.parameters()
         for name in self._given:
             if name not in known:

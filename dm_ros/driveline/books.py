@@ -79,15 +79,17 @@ class Books:
         :param first: the ``Point`` at its start, under what is held in it; points: those at the
             ends of its parts, each of h, s.
         """
-        account = self._account
+        account, jump, powers = self._account, 0.0, 0.0
         if first is not self._point:
             before, account = account, self._of(
                 first, given, account.train if first.train is self._point.train else None,
                 account.road if first.road is self._point.road else None)
-            self._jumps += account.energy - before.energy
+            jump = account.energy - before.energy
         for point in points:
             before, account = account, self._of(point, given)
-            self._integrals += (0.5 * h) * (before.powers + account.powers)
+            powers = powers + (before.powers + account.powers)
+        self._jumps += jump
+        self._integrals += (0.5 * h) * powers
         self._point, self._account = points[-1], account
 
     @property

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dm_ros.driveline.road import Road, RoadPoint
-from dm_ros.driveline.state import Layout, places
+from dm_ros.driveline.state import places, StateLayout
 from dm_ros.driveline.train import Train, TrainPoint
 
 
@@ -30,7 +30,7 @@ class Equations:
     """
 
     def __init__(self, assembly, planar):
-        layout = self.layout = Layout(assembly, planar)
+        layout = self.layout = StateLayout(assembly, planar)
         self.train = Train(assembly, layout)
         self.road = Road(assembly, layout, planar)
         n, m = len(layout), len(assembly.connections)
@@ -87,8 +87,7 @@ class Equations:
 
     def rolling(self, v_x, grade):
         """Return the state (n,) of rolling freely with v_x, m/s, on a grade; no twist, no slip."""
-        n = len(self.layout)
-        x = np.array(self.road.rolling(v_x, grade, n))
+        x = np.array(self.road.rolling(v_x, grade))
         # what turns, so that no connection twists
         turning = np.array([*places(self.layout.inertias),
                             *range(self.layout.inertias.stop, self.layout.wheels.start)], int)

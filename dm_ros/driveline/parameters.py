@@ -14,7 +14,6 @@ from dm_ros.mechanism.parameters import (
     inertia,
     Parameters,
     row,
-    SelfLockingParameters,
     SymmetricParameters,
 )
 
@@ -161,15 +160,6 @@ class AxleParameters(SymmetricParameters):
             raise ValueError(f'{self.prefix}.final_drive_ratio: 0.0 is not allowed, it must not '
                              'be 0')
         super()._check_mechanism()
-
-
-@dataclass(frozen=True)
-class CentreParameters(SelfLockingParameters):
-    """
-    A differential between axles: Table 2.
-
-    :raises ValueError: as ``SelfLockingParameters``.
-    """
 
 
 def below(kind, name):

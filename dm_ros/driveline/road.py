@@ -117,6 +117,17 @@ class Road:
         A = x[self._layout.A]
         return A if self._planar else (A[0], 0.0)
 
+    def rolling(self, v_x, grade):
+        """Return the state (n,) of rolling with v_x, m/s, on a grade; what is not here is 0."""
+        layout = self._layout
+        x = [0.0] * len(layout)
+        for place in places(layout.wheels):
+            x[place] = v_x / self._p.R
+        for place in places(layout.pads):
+            x[place] = 1.0 if v_x > 0.0 else -1.0 if v_x < 0.0 else 0.0
+        x[layout.body.start], x[layout.A.start] = v_x, G * slope(grade)[0]
+        return x
+
     # -- Jacobian: what the state does to each contact, the contacts to the rates, and the rest --
 
     def _lay_out_jacobian(self):
@@ -198,17 +209,6 @@ class Road:
 
     # -- books --
 
-    def rolling(self, v_x, grade, n):
-        """Set the state of wheels and body to rolling freely with v_x on a grade, in x (n,)."""
-        layout = self._layout
-        x = [0.0] * n
-        for place in places(layout.wheels):
-            x[place] = v_x / self._p.R
-        for place in places(layout.pads):
-            x[place] = 1.0 if v_x > 0.0 else -1.0 if v_x < 0.0 else 0.0
-        x[layout.body.start], x[layout.A.start] = v_x, G * slope(grade)[0]
-        return x
-
     def books(self, x, point, given):
         """
         Return what the books need.
@@ -229,7 +229,7 @@ class Road:
                     x[layout.wheels], x[layout.pads], x[layout.kappa],
                     x[layout.alpha] or self._none, point.loads, load_rates, point.tyres,
                     given.brakes, point.brakes):
-            stored, per_load = self._carcass.energy(mu, mu_slope, F_z, contact[10], contact[11])
+            stored, per_load = self._carcass.energy(mu, mu_slope, F_z, contact)
             pads = 0.5 * p.pad * y * y
             energy += stored + T_cap * pads + 0.5 * p.I_w * omega * omega
             parametric += (per_load + p.C_rr * p.R * pads) * rate

@@ -15,7 +15,7 @@ import numpy as np
 SPEED, TWIST, PAD, SLIP, BODY, ACCELERATION = 1.0, 0.01, 1.0, 0.1, 0.3, 1.0
 
 
-class Layout:
+class StateLayout:
     """
     Where each number of the state stands.
 

@@ -58,15 +58,17 @@ class Stepper:
 
     def reset(self):
         """Forget the Jacobian that is kept."""
-        self._kept = None
+        self.kept = None
 
     def tick(self, start, friction, given):
         """
         Return the ``Point`` s at the ends of the equal parts of a tick that begins at one.
 
+        The second that is returned is what is to be ``kept`` where the tick is taken.
+
         :raises ArithmeticError: where that leads out of the range of floating point numbers.
         """
-        kept = self._kept
+        kept = self.kept
         if kept is None or kept.ticks >= self._jacobian_ticks:
             kept = Kept(self._equations.jacobian(start, given), {}, 0)
         cut = 0
@@ -82,9 +84,7 @@ class Stepper:
                 cut += 1
             if kept.ticks:   # it may be too old
                 kept = Kept(self._equations.jacobian(start, given), {}, 0)
-        if self._jacobian_ticks:
-            self._kept = kept._replace(ticks=kept.ticks + 1)
-        return points
+        return points, kept._replace(ticks=kept.ticks + 1) if self._jacobian_ticks else None
 
     def _in_parts(self, start, friction, given, parts, kept, is_last):
         """Return the points at the ends of the parts, or None, and the error over the allowed."""

@@ -163,8 +163,9 @@ class Carcass:
         a, b, c, d, e, g = self._pieces[place]
         return a + u * (b + u * (c + u * (d + u * (e + u * g))))
 
-    def energy(self, mu, mu_slope, F_z, rho, f):
-        """Return the energy, J, and what it grows with per newton of load, J/N."""
+    def energy(self, mu, mu_slope, F_z, point):
+        """Return the energy, J, at a ``contact``, and what it grows with per newton of load."""
+        *_, rho, f, _, _ = point
         integral = self.integral(rho)
         return (mu * mu * F_z * self._ell * integral,
                 self._ell * mu * ((mu + 2.0 * mu_slope * F_z) * integral

@@ -113,6 +113,14 @@ def test_a_rigid_transfer_case_holds_both_axles_together():
     assert front > 5 * rear
 
 
+def test_the_torque_acts_on_the_input_whatever_was_added_before_it():
+    car = Driveline(transfer_case)
+    assert car.shafts[:2] == ('input', 'case')
+    snapshot = car.step(torque=18.0)
+    assert snapshot.velocity[0] == pytest.approx(18.0 / 1.8 * car.dt, rel=0.1)
+    assert car.energy.input == pytest.approx(18.0 * snapshot.position[0], rel=1e-12)
+
+
 def test_parameters_cannot_be_changed_while_it_runs():
     car = Driveline()
     with pytest.raises(TypeError):
