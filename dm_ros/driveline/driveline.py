@@ -161,11 +161,6 @@ class Driveline:
         """``{name: J}`` of all losses since the start, each of them never negative."""
         return self._books.losses
 
-    @property
-    def state_names(self):
-        """Names of the numbers of the state, in their order."""
-        return self._equations.layout.names
-
     def reset(self, speed=0.0, grade=0.0):
         """
         Go back to the start: time, angles, pose and forces zero, rolling freely.

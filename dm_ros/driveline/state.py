@@ -11,6 +11,8 @@ The state of a driveline: which numbers it has, in which order, and on which sca
 
 import numpy as np
 
+# what no solution exceeds that begins within, since V_r >= (|V_sx| + |V_s|)/2
+LARGEST_Y, LARGEST_KAPPA, LARGEST_ALPHA = 1.0, 1.0, 2.0
 # over which ``tolerance`` counts
 SPEED, TWIST, PAD, SLIP, BODY, ACCELERATION = 1.0, 0.01, 1.0, 0.1, 0.3, 1.0
 
@@ -40,6 +42,11 @@ class StateLayout:
         self.body = self._next('', ('v_x', 'v_y', 'r') if planar else ('v_x',), BODY)
         self.A = self._next('', ('A_x', 'A_y') if planar else ('A_x',), ACCELERATION)
         self.names = tuple(self._names)
+        self.bounded = slice(self.pads.start, self.alpha.stop)
+        self.bounds = np.concatenate([
+            np.full(part.stop - part.start, largest) for part, largest in (
+                (self.pads, LARGEST_Y), (self.kappa, LARGEST_KAPPA),
+                (self.alpha, LARGEST_ALPHA))])
         self.scale = np.array(self._scale)
 
     def __len__(self):

@@ -12,6 +12,10 @@ It is L-stable, and of second order with any J; so J may leave out what is not s
 kept. (J. G. Verwer, E. J. Spee, J. G. Blom, W. Hundsdorfer: A second-order Rosenbrock method
 applied to photochemical dispersion problems, SIAM J. Sci. Comput. 20, 1999.)
 
+Deflections of pads and slips of tyres have bounds that no solution exceeds; where x + h k1 or
+the end of a step does, it is brought back to them. That changes nothing where the step is short
+enough, and keeps one that is not from growing without end: a brake that locks within it.
+
 A tick is tried whole; while the error of a part is above the tolerance it is tried again in more
 equal parts, up to ``max_parts``, which are taken as they are. That is at most 2 max_parts - 1
 parts in all, whatever happens.
@@ -52,8 +56,10 @@ class Stepper:
     def __init__(self, equations, dt, p):
         self._equations, self._dt = equations, dt
         self._cuts, self._jacobian_ticks = cuts(p.max_parts), p.jacobian_ticks
-        self._one = np.eye(len(equations.layout))
-        self._per_allowed = 1.0 / (p.tolerance * equations.layout.scale)
+        layout = equations.layout
+        self._bounded, self._low, self._high = layout.bounded, -layout.bounds, layout.bounds
+        self._one = np.eye(len(layout))
+        self._per_allowed = 1.0 / (p.tolerance * layout.scale)
         self.reset()
 
     def reset(self):
@@ -99,7 +105,8 @@ class Stepper:
                     self._one - (GAMMA * h) * kept.J)
             k1 = inverse @ point.rates
             x = point.array + h * k1
-            k2 = inverse @ (equations.at(x, friction, given).rates - 2.0 * k1)
+            stage = equations.at(self._within_bounds(x.copy()), friction, given).rates
+            k2 = inverse @ (stage - 2.0 * k1)
             error = (0.5 * h) * (k1 + k2)
             errors = (error * self._per_allowed).tolist()
             worst = max(max(errors), -min(errors))
@@ -109,6 +116,14 @@ class Stepper:
                 return None, float('inf')
             if worst > 1.0 and not is_last:
                 return None, worst
-            point = equations.at(x + error, friction, given)   # x + h (3 k1 + k2)/2
+            x += error   # x + h (3 k1 + k2)/2
+            point = equations.at(self._within_bounds(x), friction, given)
             points.append(point)
         return points, worst
+
+    def _within_bounds(self, x):
+        """Return x, changed, with deflections and slips brought back to their bounds."""
+        bounded = x[self._bounded]
+        np.maximum(bounded, self._low, out=bounded)
+        np.minimum(bounded, self._high, out=bounded)
+        return x

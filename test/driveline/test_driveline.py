@@ -179,6 +179,18 @@ def test_steps_of_ten_milliseconds_stay_stable():
     assert ends[0] == pytest.approx(ends[1], rel=2e-3)
 
 
+@pytest.mark.parametrize('dt, max_parts', [(0.005, 1), (0.02, 4)])
+def test_brakes_that_lock_within_a_step_make_next_to_no_energy(dt, max_parts):
+    car = Driveline('awd', True, dt, {'driveline.max_parts': max_parts})
+    car.reset(30.0)
+    begin = car.stored_energy
+    for snapshot in drive(car, {'brakes': (2000.0,) * 4}, [], 6.0):
+        assert np.abs(snapshot.velocity).max() < 400.0
+        assert np.abs(snapshot.slip).max() <= 1.0
+    assert abs(snapshot.twist_body[0]) < 1.0
+    assert abs(car.energy.numerical) < 0.01 * begin
+
+
 @pytest.mark.parametrize('max_parts', range(1, 40))
 def test_a_tick_is_tried_in_parts_that_are_bounded(max_parts):
     numbers = cuts(max_parts)
@@ -204,6 +216,23 @@ def test_a_car_held_on_a_slope_does_not_creep():
     assert 1e-3 < abs(positions[-1]) < 0.05   # it has gone back into tyres and pads
     assert abs(car.snapshot().twist_body[0]) < 1e-12
     assert abs(positions[-1] - positions[-1000]) < 1e-12
+
+
+def test_brakes_below_seven_tenths_do_not_creep_when_the_car_is_shaken():
+    car = Driveline('rwd')
+    car.reset(0.0, 0.05)
+    held = {'brakes': (900.0,) * 4, 'grade': 0.05}
+
+    def wheels_at_rest():
+        *_, last = drive(car, held, [], 6.0)
+        assert np.abs(last.velocity[-4:]).max() < 1e-5
+        return np.array(last.position[-4:])
+    before, moved = wheels_at_rest(), 0.0
+    for tick in range(2000):
+        snapshot = car.step(torque=40.0 * math.sin(0.05 * tick), **held)
+        moved = max(moved, abs(snapshot.position[-1] - before[-1]))
+    assert moved > 2e-4 and sum(car.losses[f'{wheel}_brake'] for wheel in car.wheels) > 0.0
+    assert wheels_at_rest() == pytest.approx(before, abs=1e-6)
 
 
 def test_at_rest_on_the_level_nothing_moves_at_all():
