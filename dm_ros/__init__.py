@@ -7,6 +7,7 @@ from importlib import import_module
 
 # loaded when they are asked for: a tool shall answer to signals before it loads numpy and scipy
 HOMES = {
+    'Driveline': 'dm_ros.driveline.driveline',
     'Ensemble': 'dm_ros.ensemble',
     'SelfLockingParameters': 'dm_ros.mechanism.parameters',
     'Simulation': 'dm_ros.motion.simulation',

@@ -22,7 +22,8 @@ from dm_ros.tools.urdf import main
 
 ROOT = Path(__file__).parents[1]
 FILES = sorted(path for folder in ('config', 'config/presets')
-               for path in (ROOT / folder).glob('*.yaml'))
+               for path in (ROOT / folder).glob('*.yaml')
+               if not path.stem.startswith('driveline'))   # more than one mechanism
 PREFIXES = ('', 'rear_', 'car/axle.2-')
 Z = np.array((0.0, 0.0, 1.0))
 
