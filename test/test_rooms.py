@@ -18,7 +18,6 @@ FLOORS = [   # from the ground up; a file of the package itself is a room of its
     {'ending', 'core'}, {'mechanism'}, {'motion'}, {'driveline'},
     {'settings', 'ensemble', 'driven'}, {'files'}, {'plant', 'fmu', 'watch'}, {'ros'},
     {'tools', 'testing'}, {'__init__', 'bias', 'commands', 'energy', 'gym'}]
-    {'__init__', 'bias', 'commands', 'energy', 'gym'}]
 KNOW_ROS = {'ros', 'tools', 'testing'}
 NEED_MORE = {'gym'}   # an extra, to be imported
 PRIVATES = ROOT / 'ros' / 'privates.py'
