@@ -7,6 +7,7 @@ What a driveline is made of: elements, and elastic shafts that connect their fla
 A layout is a function that is given an ``Assembly`` and says what there is, see ``layouts``.
 """
 
+from math import inf
 from typing import NamedTuple
 
 from dm_ros.driveline.body import Wheel
@@ -65,12 +66,13 @@ class Assembly:
         """Add the input, on which the torque of the gearbox acts; return its flange."""
         return self.inertia(INPUT, self.vehicle.I_in)
 
-    def inertia(self, name, I):   # noqa: E741
-        """Add a turning inertia I, kg m^2; return its flange."""
-        if not I > 0.0:
-            raise ValueError(f'layout: the inertia of {name} is {I}, it must be above 0 kg m^2')
+    def inertia(self, name, inertia):
+        """Add what turns with an inertia, kg m^2; return its flange, for any connections."""
+        if not 0.0 < inertia < inf:
+            raise ValueError(f'layout: the inertia of {name} is {inertia}, it must be a number of '
+                             'kg m^2 above 0')
         flange = self._flange(name)
-        self.inertias[name] = I
+        self.inertias[name] = inertia
         return flange
 
     def differential(self, name, kind=SelfLockingParameters, **defaults):

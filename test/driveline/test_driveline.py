@@ -197,6 +197,22 @@ def test_a_tick_is_tried_in_parts_that_are_bounded(max_parts):
     assert numbers[0] == 1 and numbers[-1] == max_parts and sum(numbers) <= 2 * max_parts - 1
 
 
+@pytest.mark.parametrize('max_parts', [1, 2, 3, 4, 7])
+@pytest.mark.parametrize('tolerance', [1e-8, 1e-4, 2e-3])
+def test_no_tick_takes_more_trials_than_the_bound(monkeypatch, max_parts, tolerance):
+    invert, trials = np.linalg.inv, []
+    monkeypatch.setattr(np.linalg, 'inv', lambda W: (trials.append(1), invert(W))[1])   # one each
+    car = Driveline('rwd', parameters={
+        **GAPS, 'driveline.max_parts': max_parts, 'driveline.tolerance': tolerance})
+    car.reset(8.0)
+    most = 0
+    for _ in drive(car, {'torque': 400.0, 'brakes': (0.0, 0.0, 900.0, 0.0)}, [], 0.05):
+        most = max(most, len(trials))
+        trials.clear()
+    assert most <= 2 * max_parts - 1
+    assert max_parts == 1 or most > 1
+
+
 def test_a_hard_tick_is_cut_and_a_quiet_one_is_not():
     car, run = cached('tip')
     assert car.parts == 1
