@@ -57,6 +57,7 @@ setup(
             'compare_variants = dm_ros.commands:compare_variants',
             'demo = dm_ros.commands:demo',
             'differential = dm_ros.commands:differential',
+            'driveline = dm_ros.commands:driveline',
             'export_fmu = dm_ros.commands:export_fmu',
             'identify = dm_ros.commands:identify',
             'play_torques = dm_ros.commands:play_torques',

@@ -17,6 +17,7 @@ COMMANDS = {
     'compare_variants': ('tools.compare_variants', False),
     'demo': ('tools.demo', False),
     'differential': ('ros.node', True),
+    'driveline': ('ros.driveline_node', True),
     'export_fmu': ('tools.export_fmu', False),
     'identify': ('tools.identify', False),
     'play_torques': ('tools.play_torques', True),
@@ -38,8 +39,8 @@ def run(name, args=None):
     return import_module(f'dm_ros.{module}').main(args)
 
 
-(bias, compare_variants, demo, differential, export_fmu, identify, play_torques, simulate, sweep,
- urdf, watch) = (partial(run, name) for name in COMMANDS)
+(bias, compare_variants, demo, differential, driveline, export_fmu, identify, play_torques,
+ simulate, sweep, urdf, watch) = (partial(run, name) for name in COMMANDS)
 
 
 if __name__ == '__main__':   # python -m dm_ros.commands NAME ...

@@ -60,17 +60,26 @@ class Books:
     def __init__(self, equations, assembly):
         self._equations, self._weight = equations, assembly.vehicle.m * G
         wheels = [wheel.name for wheel in assembly.wheels]
-        self.names = (
-            *[loss for differential in assembly.differentials for loss in differential.losses],
-            *[f'{connection.name}_shaft' for connection in assembly.connections],
-            *[f'{wheel}_{loss}' for loss in ('slip', 'tyre_damping', 'brake', 'rolling')
-              for wheel in wheels], 'drag')
+        self.kinds = {
+            **{differential.name: differential.losses for differential in assembly.differentials},
+            'shafts': tuple([f'{connection.name}_shaft' for connection in assembly.connections]),
+            **{kind: tuple([f'{wheel}_{loss}' for loss in losses for wheel in wheels])
+               for kind, losses in (('tyres', ('slip', 'tyre_damping')),
+                                    ('brakes', ('brake',)), ('rolling', ('rolling',)))},
+            'air': ('drag',)}
+        self.names = tuple([name for names in self.kinds.values() for name in names])
 
     def start(self, point, given):
         """Begin at a ``Point``."""
         self._point, self._account = point, self._of(point, given)
         self._initial, self._jumps = self._account.energy, 0.0
         self._integrals = np.zeros(NOT_LOST + len(self.names))
+
+    def follow(self, other, point, given):
+        """Go on with the books of another at a ``Point`` whose energy may differ from its own."""
+        self._initial, self._integrals = other._initial, other._integrals.copy()
+        self._point, self._account = point, self._of(point, given)
+        self._jumps = other._jumps + self._account.energy - other._account.energy
 
     def note(self, first, points, given, h):
         """

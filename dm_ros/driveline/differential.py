@@ -31,6 +31,7 @@ class Differential:
             SYMMETRIC if isinstance(p, SymmetricParameters) else SELF_LOCKING, p)
         self.ports = mechanism.inputs
         self.shafts = tuple([f'{shafts_name}_{shaft}' for shaft in mechanism.shafts])
+        self.shaft_of = {port: f'{shafts_name}_{port}' for port in self.ports}
         self.moments = tuple([f'{name}_{moment}' for moment in mechanism.moments])
         self.clutches = tuple([f'{name}_{clutch}' for clutch in mechanism.clutches])
         self.actuators = actuators_of(p, mechanism.clutches, dt)

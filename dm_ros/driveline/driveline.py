@@ -137,9 +137,48 @@ class Driveline:
         return self.ticks * self.dt
 
     @property
+    def torque(self):
+        """The torque on the input in the last tick, N m."""
+        return self._given.torque
+
+    @property
+    def grade(self):
+        """The tangent of the slope in the last tick, or at the start."""
+        return self._given.grade
+
+    @property
     def clutch_force(self):
         """Axial force on each clutch in the last tick, N, in the order of ``clutches``."""
         return self._forces
+
+    @property
+    def force_limits(self):
+        """What a larger force on each clutch is clamped to, N."""
+        return tuple([actuator.limit for actuator in self._actuators])
+
+    @property
+    def language(self):
+        """What the ticks are made in."""
+        return 'Python'
+
+    @property
+    def slip_speed(self):
+        """Speed of the tread of each wheel over the road, m/s, (V_sx, V_sy) in its frame."""
+        return tuple([contact[4:6] for _, _, contact in self._point.road.tyres])
+
+    @property
+    def clutched_shafts(self):
+        """(shaft, carrier) of each of ``clutches``."""
+        return tuple([(d.shaft_of[port], d.shafts[0]) for d in self._differentials if d.clutches
+                      for port in d.ports[-2:]])
+
+    @property
+    def driven_by(self):
+        """``{shaft: connection}`` of those at whose end b a connection is."""
+        places = {(d.name, port): shaft for d in self._differentials
+                  for port, shaft in d.shaft_of.items()}
+        return {places.get((c.b.element, c.b.port), c.b.element): c.name
+                for c in self._assembly.connections}
 
     @property
     def parts(self):
@@ -161,6 +200,11 @@ class Driveline:
         """``{name: J}`` of all losses since the start, each of them never negative."""
         return self._books.losses
 
+    @property
+    def kinds_of_loss(self):
+        """``{kind: names}`` of the losses: of each differential, shafts, tyres, brakes, air."""
+        return self._books.kinds
+
     def reset(self, speed=0.0, grade=0.0):
         """
         Go back to the start: time, angles, pose and forces zero, rolling freely.
@@ -173,7 +217,7 @@ class Driveline:
                         f'a number of m/s in [-{FASTEST:g}, {FASTEST:g}]')
         grade = checked('grade', grade, lambda v: abs(v) <= STEEPEST,
                         f'a tangent in [-{STEEPEST:g}, {STEEPEST:g}]')
-        self.ticks, self._parts = 0, 1
+        self.ticks, self._parts, self.coarse_steps = 0, 1, 0
         self._given = self._inputs.idle(grade)
         self._forces = (0.0,) * len(self.clutches)
         self._friction = self._friction_under(self._forces)
@@ -184,6 +228,25 @@ class Driveline:
         self._point = self._equations.at(x, self._friction, self._given)
         self._stepper.reset()
         self._books.start(self._point, self._given)
+
+    def follow(self, other):
+        """
+        Go on where another driveline is, as it moves, under the parameters of this one.
+
+        What its energy changes by counts among the jumps.
+
+        :raises ValueError: where the other has another layout.
+        """
+        if (other.planar, other.shafts, other.connections, other.inputs) != (
+                self.planar, self.shafts, self.connections, self.inputs):
+            raise ValueError('follow: the other driveline has another layout')
+        self.ticks, self.coarse_steps = other.ticks, other.coarse_steps
+        self._parts, self._given, self._forces = other._parts, other._given, other._forces
+        self._flows, self._turned, self._pose = other._flows, other._turned, other._pose
+        self._friction = self._friction_under(self._forces)
+        self._point = self._equations.at(other._point.array, self._friction, self._given)
+        self._stepper.reset()
+        self._books.follow(other._books, self._point, self._given)
 
     def step(self, torque=0.0, brakes=None, clutch_forces=MappingProxyType({}), steer=0.0,
              grade=0.0, grip=None, contact=None, wind=0.0):
@@ -227,7 +290,7 @@ class Driveline:
         flows = tuple([self._flow(*of_one) for of_one in zip(
             self._differentials, point.train.held, self._equations.layout.differentials,
             self._flows)])
-        points, kept = self._stepper.tick(point, friction, given)
+        points, kept, is_coarse = self._stepper.tick(point, friction, given)
         h = self.dt / len(points)
         turned, pose = self._turned, self._pose
         before, speeds = point.x, self._equations.layout.speeds
@@ -240,6 +303,7 @@ class Driveline:
         self._point, self._friction, self._forces = points[-1], friction, followed
         self._given, self._flows, self._turned, self._pose = given, flows, turned, pose
         self._parts, self._stepper.kept = len(points), kept
+        self.coarse_steps += is_coarse
         self.ticks += 1
 
     def _friction_under(self, forces):

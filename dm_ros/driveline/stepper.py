@@ -70,7 +70,8 @@ class Stepper:
         """
         Return the ``Point`` s at the ends of the equal parts of a tick that begins at one.
 
-        The second that is returned is what is to be ``kept`` where the tick is taken.
+        Then come what is to be ``kept`` where the tick is taken, and whether it was coarse: its
+        parts may not be shorter, though an error was above the tolerance.
 
         :raises ArithmeticError: where that leads out of the range of floating point numbers.
         """
@@ -90,12 +91,13 @@ class Stepper:
                 cut += 1
             if kept.ticks:   # it may be too old
                 kept = Kept(self._equations.jacobian(start, given), {}, 0)
-        return points, kept._replace(ticks=kept.ticks + 1) if self._jacobian_ticks else None
+        return (points, kept._replace(ticks=kept.ticks + 1) if self._jacobian_ticks else None,
+                worst > 1.0)
 
     def _in_parts(self, start, friction, given, parts, kept, is_last):
         """Return the points at the ends of the parts, or None, and the error over the allowed."""
         equations, h = self._equations, self._dt / parts
-        point, points = start, []
+        point, points, largest = start, [], 0.0
         for part in range(parts):
             if part and not self._jacobian_ticks:
                 kept = Kept(equations.jacobian(point, given), {}, 0)
@@ -116,10 +118,11 @@ class Stepper:
                 return None, float('inf')
             if worst > 1.0 and not is_last:
                 return None, worst
+            largest = max(largest, worst)
             x += error   # x + h (3 k1 + k2)/2
             point = equations.at(self._within_bounds(x), friction, given)
             points.append(point)
-        return points, worst
+        return points, largest
 
     def _within_bounds(self, x):
         """Return x, changed, with deflections and slips brought back to their bounds."""

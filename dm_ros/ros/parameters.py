@@ -58,9 +58,14 @@ def declare(node, table, given, mine):
     rows = {name: entry for name, entry in table.rows().values() if name in mine}
     started = table.changed({name: entry.strictly_checked(name, given[name])
                              for name, entry in rows.items() if name in given}).named()
-    for name, entry in rows.items():
-        node.declare_parameter(name, started[name], descriptor(entry))
+    declare_rows(node, rows, started)
     return started
+
+
+def declare_rows(node, rows, values):
+    """Declare parameters with the values of the start; rows: ``{full name: Row}``."""
+    for name, entry in rows.items():
+        node.declare_parameter(name, values[name], descriptor(entry))
 
 
 def strictly_checked(rows, name, value):

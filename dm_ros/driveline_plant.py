@@ -1,0 +1,216 @@
+# Copyright 2026 dm_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""A driveline as the node ``driveline`` drives it."""
+
+from dataclasses import dataclass
+from functools import cache
+import math
+from typing import NamedTuple
+
+from dm_ros.driveline.driveline import Driveline
+from dm_ros.driveline.layouts import LAYOUTS
+from dm_ros.driven import Driven
+from dm_ros.mechanism.parameters import row
+from dm_ros.settings import LoopParameters
+
+FRAME = r'[A-Za-z][A-Za-z0-9_/.-]*', 'a letter and then letters, digits and any of _ / . -'
+DEMANDED = 'torque', 'force'   # kinds of ports that a stale demand leaves; a brake is no such one
+TOPICS = {'torque': 'torque/{}', 'capacity': 'brake/{}', 'force': 'clutch/{}', 'angle': '{}',
+          'tangent': '{}'}     # of single ports, by their kind; others follow their names
+
+
+@dataclass(frozen=True)
+class DrivelineNodeParameters(LoopParameters):
+    """What the node ``driveline`` has beside the vehicle; raises as ``LoopParameters``."""
+
+    layout: str = row('layout', 'awd', '', 0, 0, 'which wheels are driven', kind=str,
+                      read_only=True, choices=tuple(LAYOUTS))
+    planar: bool = row('planar', False, '', 0, 0,
+                       'whether the body moves sideways and yaws too, and can be steered',
+                       kind=bool, read_only=True)
+    initial_speed: float = row('initial_speed', 0.0, 'm/s', -1e3, 1e3,
+                               'of the body at the start and after a reset')
+    odom_frame_id: str = row('odom_frame_id', 'odom', '', 0, 0, 'frame in which the car moves',
+                             kind=str, read_only=True, pattern=FRAME)
+    base_frame_id: str = row('base_frame_id', 'base_link', '', 0, 0,
+                             'frame of the car: on the ground below its centre of mass',
+                             kind=str, read_only=True, pattern=FRAME)
+
+
+@cache
+def rows_of(layout):
+    """Return ``{full name: Row}`` of the parameters of a car with a layout."""
+    return Driveline(layout).parameter_rows
+
+
+def all_rows():
+    """Return ``{full name: Row}`` of every parameter that a node of any layout has."""
+    rows = dict(DrivelineNodeParameters.rows().values())
+    for layout in LAYOUTS:
+        rows |= rows_of(layout)
+    return rows
+
+
+def make_driveline(values, dt=None):
+    """
+    Return the ``Driveline`` that a node with the given parameters would run.
+
+    :param values: ``{full name: value}``; those of other layouts count for nothing.
+    :param dt: length of a tick, s; None for that of the parameter ``rate``.
+    """
+    settings = DrivelineNodeParameters().changed(DrivelineNodeParameters.part_of(values))
+    rows = rows_of(settings.layout)
+    car = Driveline(settings.layout, settings.planar, 1 / settings.rate if dt is None else dt,
+                    {name: value for name, value in values.items() if name in rows})
+    car.reset(settings.initial_speed)
+    return car
+
+
+def node_ports(car):
+    """Return the ``Port`` s of a ``Driveline`` as a node has them: all but the wind."""
+    ports = []
+    for port in car.ports:
+        if port.name == 'wind':
+            continue
+        if port.name == 'steer' and not car.planar:
+            port = port._replace(low=0.0, high=0.0)   # the body cannot turn
+        by_effort = port.kind in (*DEMANDED, 'capacity')
+        ports.append(port._replace(array='effort' if by_effort else 'position',
+                                   lasts=port.kind not in DEMANDED))
+    return tuple(ports)
+
+
+def topics_of(ports):
+    """Return ``{topic: port name}`` of the topics of single ports, below ~."""
+    topics = {}
+    for port in ports:
+        element, _, what = port.name.rpartition('_')
+        if port.kind in TOPICS:
+            element = element if port.kind in ('capacity', 'force') else port.name
+            topics[TOPICS[port.kind].format(element)] = port.name
+        else:
+            topics[f'{what}/{element}'] = port.name
+    return topics
+
+
+class PreparedDriveline(NamedTuple):
+    """A change of parameters that may be adopted: what holds then."""
+
+    settings: DrivelineNodeParameters
+    car: Driveline | None   # None where the vehicle stays as it is
+
+
+class DrivelinePlant(Driven):
+    """
+    A driveline as the node runs it.
+
+    Its ports are those of the ``Driveline`` but the wind. A demand for the input or a clutch that
+    is too old counts as zero; brakes, steering, slope and road stay what they were, since a car
+    whose brakes let go is no safe state.
+
+    :param values: ``{full name: value}`` of the parameters that differ from their defaults.
+    :param log: has ``warning`` and ``info``; conditions are logged there.
+    :raises ValueError: names the parameter, its value and what is allowed.
+    """
+
+    grouped = 'commands'
+    driving = ('input',)
+
+    def __init__(self, values, log):
+        settings = DrivelineNodeParameters().changed(DrivelineNodeParameters.part_of(values))
+        car = make_driveline(values)
+        ports = node_ports(car)
+        super().__init__(settings, car, ports, topics_of(ports), log)
+        self._wheels, self._clutches = len(car.wheels), len(car.clutches)
+        self.reset()
+        self.adopt(PreparedDriveline(settings, None))
+
+    @property
+    def title(self):
+        """What it is, in a word."""
+        return f'{self.settings.layout}{" planar" * self.settings.planar}'
+
+    @property
+    def words(self):
+        """What the log tells of it at the start, in parts."""
+        clutches = self.simulation.clutches
+        return [f'forces on {", ".join(clutches)}'] if clutches else []
+
+    @property
+    def values(self):
+        """``{full name: value}`` of all parameters, its own and those of the vehicle."""
+        return {**self.settings.named(), **self.simulation.parameters}
+
+    @property
+    def rows(self):
+        """``{full name: Row}`` of all parameters."""
+        return {**dict(self.settings.rows().values()), **self.simulation.parameter_rows}
+
+    def _step(self, held):
+        wheels, clutches = self._wheels, self._clutches
+        torque, *others = held
+        brakes, others = others[:wheels], others[wheels:]
+        forces, (steer, grade, *road) = others[:clutches], others[clutches:]
+        return self.simulation.step(
+            torque, brakes, dict(zip(self.simulation.clutches, forces)), steer, grade,
+            road[:wheels], road[wheels:])
+
+    def _reset_simulation(self):
+        self.simulation.reset(self.settings.initial_speed)
+
+    def prepared(self, changes):
+        """
+        Return what ``adopt`` takes, all of the changes or none; nothing is touched yet.
+
+        It may be called from another thread: what it makes takes some milliseconds.
+
+        :param changes: ``{full name: value}``.
+        :raises ValueError: names the parameter, its value and what is allowed.
+        """
+        changes = self.checked(changes)
+        settings = self.settings.changed(self.settings.part_of(changes))
+        before, car = self.simulation, None
+        vehicle = {**before.parameters, **{name: value for name, value in changes.items()
+                                           if name in before.parameters}}
+        if vehicle != dict(before.parameters):
+            car = Driveline(settings.layout, settings.planar, before.dt, vehicle)
+            if car.clutches != before.clutches:
+                raise ValueError(f'{", ".join(changes)}: clutches cannot come or go while it runs')
+        return PreparedDriveline(settings, car)
+
+    def adopt(self, prepared):
+        """Put into force what ``prepared`` returned; the car goes on as it moves."""
+        self.settings = prepared.settings
+        if prepared.car:
+            prepared.car.follow(self.simulation)
+            self.simulation = prepared.car
+        limits = {'torque': self.settings.torque_limit, 'capacity': self.settings.torque_limit}
+        forces = dict(zip((f'{clutch}_clutch' for clutch in self.simulation.clutches),
+                          self.simulation.force_limits))
+        self.limit(tuple([forces.get(port.name, limits.get(port.kind, math.inf))
+                          for port in self.inputs.ports]))
+
+    def told_of_loop(self):
+        """Return ``{key: value}`` of what is driven, for diagnostics."""
+        return {'layout': self.title, **super().told_of_loop()}
+
+    def told_of_inputs(self):
+        """Return ``{key: value}`` of the forces of the actuators, for diagnostics."""
+        car = self.simulation
+        return {f'force on {clutch}_clutch [N]': f'{force:g}'
+                for clutch, force in zip(car.clutches, car.clutch_force)}
+
+    def told_of_energy(self):
+        """Return complaints and ``{key: value}`` of the energy, for diagnostics."""
+        total, losses = self.simulation.energy, self.simulation.losses
+        return [], {
+            'work of the input [J]': f'{total.input:.6g}',
+            'work of gravity and wind [J]': f'{total.gravity + total.wind:.6g}',
+            'stored [J]': f'{self.simulation.stored_energy:.6g}',
+            'lost [J]': f'{total.lost:.6g}',
+            **{f'lost in {what} [J]': f'{sum(losses[name] for name in names):.6g}'
+               for what, names in self.simulation.kinds_of_loss.items()},
+            'added by changes of load [J]': f'{total.parametric:.3g}',
+            'added by changes of brakes, road and parameters [J]': f'{total.jumps:.3g}',
+            'taken by the error of the step [J]': f'{total.numerical:.3g}'}
