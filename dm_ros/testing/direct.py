@@ -1,9 +1,11 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A differential and a control law in one process, without topics."""
+"""A differential or a driveline and a control law in one process, without topics."""
 
+from dm_ros.driveline.driveline import Driveline
 from dm_ros.files.bag import TickBag
+from dm_ros.files.driveline_record import driveline_row, DrivelineRecord
 from dm_ros.files.record import Record
 from dm_ros.motion.simulation import Simulation
 
@@ -62,6 +64,49 @@ class DirectDifferential:
     def record(self):
         """The ``Record`` of all runs."""
         return Record.of(self.simulation, self.snapshots)
+
+
+class DirectDriveline:
+    """
+    A driveline and a control law, without topics.
+
+    :param layout: ``awd``, ``fwd``, ``rwd`` or a function, see ``Driveline``; rate: ticks in a
+        second; speed: of the body at the start, m/s; grade: of the slope there.
+    :param options: as for ``Driveline``.
+    """
+
+    def __init__(self, layout='awd', rate=1000.0, speed=0.0, grade=0.0, **options):
+        self.simulation = Driveline(layout, dt=1.0 / rate, **options)
+        self.simulation.reset(speed, grade)
+        self.snapshots, self._rows = [], []
+
+    def run(self, law, seconds=None, until=None):
+        """
+        Step until a condition or for a time, whichever comes first.
+
+        :param law: function of the last ``Snapshot`` that returns the inputs of the next tick, a
+            mapping from the arguments of ``Driveline.step`` to their values.
+        :param seconds: simulated time.
+        :param until: function of a ``Snapshot``; true at the last tick.
+        :return: the ``DrivelineRecord`` of this run.
+        """
+        car, first = self.simulation, len(self.snapshots)
+        count, snapshot = ticks_of(seconds, until, car), car.snapshot()
+        while count is None or len(self.snapshots) - first < count:
+            snapshot = car.step(**law(snapshot))
+            self.snapshots.append(snapshot)
+            self._rows.append(driveline_row(snapshot, car.clutch_force))
+            if until and until(snapshot):
+                break
+        return self._record_of(first)
+
+    @property
+    def record(self):
+        """The ``DrivelineRecord`` of all runs."""
+        return self._record_of(0)
+
+    def _record_of(self, first):
+        return DrivelineRecord(self.simulation, self._rows[first:], 'driveline')
 
 
 class Ticks:

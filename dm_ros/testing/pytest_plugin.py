@@ -6,6 +6,7 @@ Fixtures for the tests of a controller, active in pytest as soon as dm_ros is in
 
 - ``differential`` makes a ``LockstepDifferential``: real topics, the test's own nodes
 - ``direct_differential`` makes a ``DirectDifferential``: a control law as a function, no topics
+- ``driveline`` and ``direct_driveline`` make a ``LockstepDriveline`` and a ``DirectDriveline``
 
 ::
 
@@ -67,6 +68,33 @@ def direct_differential(request):
     leave_records(request, made)
 
 
+@pytest.fixture
+def driveline(request):
+    """Return a function that starts a ``LockstepDriveline``; its arguments are those."""
+    from dm_ros.testing.lockstep import LockstepDriveline
+    with ExitStack() as stack:
+        made = []
+
+        def make(layout='awd', planar=False, rate=1000.0, parameters=None):
+            made.append(stack.enter_context(LockstepDriveline(layout, planar, rate, parameters)))
+            return made[-1]
+        yield make
+        leave_records(request, made)
+
+
+@pytest.fixture
+def direct_driveline(request):
+    """Return a function that makes a ``DirectDriveline``; its arguments are those."""
+    from dm_ros.testing.direct import DirectDriveline
+    made = []
+
+    def make(layout='awd', rate=1000.0, **options):
+        made.append(DirectDriveline(layout, rate, **options))
+        return made[-1]
+    yield make
+    leave_records(request, made)
+
+
 def leave_records(request, differentials):
     """Write the records of a failed test, if somebody wants them."""
     folder = request.config.getoption('--differential-records')
@@ -80,5 +108,5 @@ def leave_records(request, differentials):
         if made.snapshots:
             made.record.save_csv(folder / f'{name}_{number}.csv')
             made.record.save_plot(folder / f'{name}_{number}.png')
-            if has_rosbags():
+            if has_rosbags() and hasattr(made, 'save_bag'):
                 made.save_bag(folder / f'{name}_{number}_bag')
