@@ -20,8 +20,7 @@ ELASTIC = 0.7   # |y| up to which the pads only deflect
 def friction(pad, c_b, w_low, omega, y):
     """Return (T/T_cap, dy/dt) and what is lost over T_cap, rad/s."""
     slide, q = _slide(omega, y), omega / w_low
-    # y is beyond 1 by errors of the step alone: they make no energy
-    viscous = c_b / (1.0 + q * q) * max(0.0, 1.0 - y * y) * omega
+    viscous = c_b / (1.0 + q * q) * (1.0 - y * y) * omega
     rate = slide * abs(omega) * y
     return y + viscous, (omega - rate) / pad, rate * y + viscous * omega
 
@@ -31,10 +30,9 @@ def slopes(pad, c_b, w_low, omega, y):
     slide, q = _slide(omega, y), omega / w_low
     z = min(1.0, (abs(y) - ELASTIC) / (1.0 - ELASTIC)) if slide else 0.0
     slide_y = 6.0 * z * (1.0 - z) / (1.0 - ELASTIC) * (1.0 if y > 0.0 else -1.0)
-    fade, free = 1.0 + q * q, max(0.0, 1.0 - y * y)
-    speed = abs(omega)
-    return (c_b * free * (1.0 - q * q) / (fade * fade),
-            1.0 - (2.0 * c_b * y * omega / fade if free else 0.0),
+    fade, speed = 1.0 + q * q, abs(omega)
+    return (c_b * (1.0 - y * y) * (1.0 - q * q) / (fade * fade),
+            1.0 - 2.0 * c_b * y * omega / fade,
             (1.0 - slide * y * (1.0 if omega > 0.0 else -1.0)) / pad,
             -speed * (slide + slide_y * y) / pad)
 
