@@ -21,6 +21,7 @@ from rclpy.parameter import Parameter
 from dm_ros.commands import COMMANDS
 from dm_ros.ros import loops
 from dm_ros.ros.domain import own_domain
+from dm_ros.ros.driveline_node import DrivelineNode
 from dm_ros.ros.node import DifferentialNode
 
 ROOT = Path(__file__).parents[2]
@@ -46,8 +47,17 @@ class Ros:
         """Start a node ``differential`` in this process, in this domain; return it."""
         overrides = [Parameter(name.replace('__', '.'), value=value)
                      for name, value in {'variant': variant, **parameters}.items()]
-        node = DifferentialNode(context=self.context, parameter_overrides=overrides,
-                                cli_args=list(arguments))
+        return self._started(DifferentialNode, overrides, arguments)
+
+    def driveline(self, **parameters):
+        """Start a node ``driveline`` in this process, in this domain; return it."""
+        overrides = [Parameter(name.replace('__', '.'), value=value)
+                     for name, value in parameters.items()]
+        return self._started(DrivelineNode, overrides, ())
+
+    def _started(self, kind, overrides, arguments):
+        node = kind(context=self.context, parameter_overrides=overrides,
+                    cli_args=list(arguments))
         self._differentials.append(node)
         timer, = node.timers
         assert timer.timer_period_ns == 10**9
