@@ -92,6 +92,7 @@ bench: .venv-bench/done  ## measure what a step costs, beside other tools, and h
 	env -u PYTHONPATH .venv-bench/bin/python bench/step.py $(BENCH_ARGS)
 	env -u PYTHONPATH .venv-bench/bin/python bench/half_shafts.py $(BENCH_ARGS)
 	env -u PYTHONPATH .venv-bench/bin/python bench/ensemble.py $(BENCH_ARGS)
+	env -u PYTHONPATH .venv-bench/bin/python bench/driveline.py $(BENCH_ARGS)
 
 bench-sweep: setup  ## measure how time and memory of sweeps grow with the sets: BENCH_ARGS
 	.venv/bin/python bench/sweep.py $(BENCH_ARGS)

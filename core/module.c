@@ -61,7 +61,7 @@ PyMODINIT_FUNC PyInit__core(void)
     dm_prepare_rules();
     PyObject *module = PyModule_Create(&definition);
     if (module && (dm_add_ticker(module) || dm_add_ensemble(module)
-                   || dm_add_coupled_step(module))) {
+                   || dm_add_coupled_step(module) || dm_add_points(module))) {
         Py_DECREF(module);
         return NULL;
     }

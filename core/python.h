@@ -23,5 +23,6 @@ int dm_copied(const char *what, const char *bytes, Py_ssize_t size, void *into, 
 int dm_add_ticker(PyObject *module);
 int dm_add_ensemble(PyObject *module);
 int dm_add_coupled_step(PyObject *module);
+int dm_add_points(PyObject *module);
 
 #endif

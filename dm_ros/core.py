@@ -7,7 +7,7 @@ The ticks in C, where they are built: ``language`` is what is in use, ``'C'`` or
 Both give the same bits; Python is the reference, and what is left where there was no compiler.
 The environment variable ``DM_ROS_CORE`` chooses, ``c`` or ``python``; without it C is taken where
 it is built. In C are whole ticks of both mechanisms under both laws, on torques, with their books;
-and the steps with half-shafts, with theirs.
+the steps with half-shafts, with theirs; and the passive law at one state, for drivelines.
 """
 
 from importlib import import_module
@@ -31,4 +31,7 @@ def _chosen(choice):
 _module = _chosen(os.environ.get(CHOICE, ''))
 language = 'C' if _module else 'Python'
 Ticker = getattr(_module, 'Ticker', None)   # None where Python does it
-coupled_step = getattr(_module, 'coupled_step', None)   # likewise
+coupled_step = getattr(_module, 'coupled_step', None)   # likewise, and so are these
+passive_point = getattr(_module, 'passive_point', None)
+passive_slopes = getattr(_module, 'passive_slopes', None)
+passive_lost = getattr(_module, 'passive_lost', None)

@@ -3,15 +3,35 @@
 
 """A differential as an element of a driveline: the passive law between three flanges."""
 
+from dataclasses import astuple
+from functools import partial
 from operator import itemgetter
+import struct
 from types import SimpleNamespace
 
+from dm_ros import core
 from dm_ros.mechanism import clutched, elimination, passive
 from dm_ros.mechanism.kinetic import kinetic_form
 from dm_ros.mechanism.parameters import SymmetricParameters
 from dm_ros.mechanism.variants import equipped, SELF_LOCKING, SYMMETRIC
 from dm_ros.motion.actuators import actuators_of
 from dm_ros.motion.models import no_solution
+
+
+def in_python(k):
+    """Return functions of (u, w, s, point) at a state: the point, its slopes, what is lost."""
+    def slopes(u, w, s, point):
+        return passive.jacobian(k, u, point)[0], *passive.torque_slopes(k, u, point)
+    return (partial(passive.evaluate, k), slopes,
+            lambda u, w, s, point: passive.lost_powers(k, u, point))
+
+
+def in_c(k):
+    """Return the same in C, to the same bits; it takes less time to find a point anew there."""
+    bytes_of_k = struct.pack(f'{len(astuple(k))}d', *astuple(k))
+    return (partial(core.passive_point, bytes_of_k),
+            lambda u, w, s, point: core.passive_slopes(bytes_of_k, u, w, s),
+            lambda u, w, s, point: core.passive_lost(bytes_of_k, u, w, s))
 
 
 class Differential:
@@ -39,6 +59,7 @@ class Differential:
         k = self.k = passive.coefficients(p, bool(mechanism.clutches))
         if not (elimination.is_finite(p, k) and passive.has_solutions(k)):
             raise no_solution(p)
+        self.evaluate, self.slopes, self._lost = (in_c if core.passive_point else in_python)(k)
         self.ratio = k.g_F or 1.0   # speed of the input shaft over that of the carrier
         self.k_1, self.k_2 = k.k_1, k.k_2
         self._spin = k.k_2 / p.g_2s
@@ -68,9 +89,9 @@ class Differential:
             return w, w + self.k_1 * s, w - self.k_2 * s, self.k.g_F * w, spin
         return w, w + self.k_1 * s, w - self.k_2 * s, spin
 
-    def lost_powers(self, u, point):
+    def lost_powers(self, u, w, s, point):
         """Return what each of ``losses`` takes, W, at a ``passive`` point under what is held."""
-        return self._losses(passive.lost_powers(self.k, u, point))
+        return self._losses(self._lost(u, w, s, point))
 
     def internal_moments(self, point):
         """Return the ``moments``, N m."""

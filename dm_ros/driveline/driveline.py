@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dm_ros import core
 from dm_ros.driveline.assembly import Assembly
 from dm_ros.driveline.books import Books
 from dm_ros.driveline.equations import Equations
@@ -158,8 +159,8 @@ class Driveline:
 
     @property
     def language(self):
-        """What the ticks are made in."""
-        return 'Python'
+        """What the ticks are made in, to the same bits."""
+        return 'Python, differentials in C' if core.passive_point else 'Python'
 
     @property
     def slip_speed(self):

@@ -73,7 +73,7 @@ class Equations:
     def jacobian(self, point, given):
         """Return df/dx at a ``Point``, (n, n), at fixed signs and without the columns of A."""
         rates_per, per_state, contacts = self._rates_per, self._per_state, self._contacts
-        of_differentials, of_torques = self.train.slopes(point.train)
+        of_differentials, of_torques = self.train.slopes(point.x, point.train)
         of_road, of_contacts = self.road.slopes(point.x, point.road, given)
         inner, outer = self.road.geometry(given.steer)
         if outer is not self._outer:

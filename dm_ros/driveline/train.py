@@ -14,7 +14,6 @@ import numpy as np
 
 from dm_ros.driveline import shafts
 from dm_ros.driveline.state import places
-from dm_ros.mechanism.passive import evaluate, jacobian, torque_slopes
 
 
 class TrainPoint(NamedTuple):
@@ -47,7 +46,7 @@ class Train:
         self.has_gaps = any(beta for _, _, beta in self.shafts)
         self._layout = layout
         self._places = list(zip(self.differentials, layout.differentials))
-        self._differentials = [(d.ratio, d.k_1, d.k_2, d.k, n) for d, n in self._places]
+        self._differentials = [(d.ratio, d.k_1, d.k_2, d.evaluate, n) for d, n in self._places]
         self._first = len(self.inertias)   # flange of a differential
         first = self._first + 3 * len(self.differentials)
         self.wheel_flanges = slice(first, first + len(assembly.wheels))
@@ -78,11 +77,11 @@ class Train:
             load[b] += T
         held, points = [], []
         flange = self._first
-        for (_, _, _, k, n), (S_1, S_2) in zip(self._differentials, friction):
+        for (_, _, _, evaluate, n), (S_1, S_2) in zip(self._differentials, friction):
             T_in, T_1, T_2 = load[flange:flange + 3]
             u = T_in, T_1, T_2, S_1, S_2
             held.append(u)
-            points.append(evaluate(k, u, x[n], x[n + 1]))
+            points.append(evaluate(u, x[n], x[n + 1]))
             flange += 3
         return TrainPoint(rates, springs, dampings, load, held, points)
 
@@ -139,16 +138,15 @@ class Train:
         """Return (state, shaft) of the second that ``slopes`` returns."""
         return [(place, shaft) for place, shaft, _, _ in self._entries]
 
-    def slopes(self, point):
+    def slopes(self, x, point):
         """
         Return the slopes of the differentials: four each at given torques, and per shaft torque.
 
         The other accelerations per shaft torque are ``per_torque``, (n, shafts).
         """
         own, slopes = [], []
-        for (_, _, _, k, _), u, at in zip(self._differentials, point.held, point.points):
-            four, _ = jacobian(k, u, at)
-            w, s = torque_slopes(k, u, at)
+        for (differential, n), u, at in zip(self._places, point.held, point.points):
+            four, w, s = differential.slopes(u, x[n], x[n + 1], at)
             own += four
             slopes += w
             slopes += s
@@ -173,7 +171,7 @@ class Train:
         for (differential, n), u, at in zip(self._places, point.held, point.points):
             (m_11, m_12, m_22), w, s = differential.form, x[n], x[n + 1]
             energy += 0.5 * (m_11 * w * w + m_22 * s * s) + m_12 * w * s
-            lost += differential.lost_powers(u, at)
+            lost += differential.lost_powers(u, w, s, at)
         for (k, _, _), spring, damping, rate in zip(
                 self.shafts, point.springs, point.damping, point.rates):
             energy += 0.5 * spring * spring / k
