@@ -4,9 +4,12 @@
 """The node ``driveline`` over real topics, in a domain of its own."""
 
 from math import atan, cos, isnan, sin
+from pathlib import Path
+import signal
 
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from processes import command, Forked
 import pytest
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
@@ -17,6 +20,7 @@ from std_srvs.srv import SetBool, Trigger
 from dm_ros import Driveline
 
 NAN = float('nan')
+CONFIG = Path(__file__).parents[2] / 'config'
 WHEELS = 'front_left', 'front_right', 'rear_left', 'rear_right'
 
 
@@ -205,3 +209,26 @@ def test_the_fixture_stops_to_the_tick_and_repeats_bit_for_bit(driveline):
     assert again.columns['velocity.input'].tobytes() == first
     with pytest.raises(ValueError, match='parameters: layout is not one of them here'):
         driveline(parameters={'layout': 'fwd'})
+
+
+@pytest.mark.parametrize('layout, words', [('awd', []), ('fwd', ['76 parameters of another'])])
+def test_as_a_process_its_parameter_file_loads_and_a_signal_ends_it(ros, layout, words):
+    with Forked(command('driveline'), '--ros-args', '--params-file',
+                CONFIG / 'driveline_awd.yaml', '-p', f'layout:={layout}') as process:
+        joints = ros.listen(JointState, '/driveline/joint_states')
+        ros.until(lambda: len(joints) > 3)
+        assert process.ended(signal.SIGTERM) == 0
+    assert 'Traceback' not in process.errors
+    assert all(word in process.errors for word in [f'{layout} at 200 Hz', *words])
+
+
+@pytest.mark.parametrize('parameter, words', [
+    ('driveline.mas:=1.0', 'driveline: error: driveline.mas: there is no such parameter'),
+    ('layout:=4wd', "driveline: error: layout: '4wd' is not allowed, it must be one of fwd, rwd"),
+    ('base_frame_id:=2x', "driveline: error: base_frame_id: '2x' is not allowed"),
+    ('driveline.tyre.damping:=4.0', 'driveline: error: driveline.tyre.damping: damping times')])
+def test_as_a_process_a_wrong_parameter_ends_it_with_code_2_and_one_line(ros, parameter, words):
+    with Forked(command('driveline'), '--ros-args', '-p', parameter) as process:
+        assert process.ended() == 2
+        line, = process.errors.strip().splitlines()
+    assert line.startswith(words)
