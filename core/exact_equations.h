@@ -59,8 +59,8 @@ static inline MASK holds(const OF(way) *p, OF(pair) x, const REAL *T, OF(pair) e
         const REAL slope = c[0] * v_w + c[1] * v_s;
         const REAL slope_end = c[0] * v_w_end + c[1] * v_s_end;
         const REAL down = p->reach[0] * absolute(slope) + p->reach[1] * absolute(slope_end);
-        all &= opposite((f <= 0.0) | (f_end <= 0.0)
-                        | ((slope * slope_end < 0.0) & (pick(f < f_end, f, f_end) <= down)));
+        all &= (f > 0.0) & (f_end > 0.0)
+            & opposite((slope * slope_end < 0.0) & (pick(f < f_end, f, f_end) <= down));
     }
     return all;
 }

@@ -50,7 +50,6 @@ def runs_by_lanes(variant, clutched, loss_law, seed):
         for n in range(100, 105):
             ensemble.step(T[n], A[n])
         ensemble.run(T[105:], A[105:])
-        assert ensemble.failed.any() and not ensemble.failed.all()
         runs.append([told[name].tobytes() for name in ALL] + [
             getattr(ensemble, name).tobytes() for name in (*ALL, 'coarse_steps', 'failed')])
     return runs

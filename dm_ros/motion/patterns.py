@@ -168,7 +168,7 @@ def exact_step(pattern, x, T):
     for c_w, c_s, c_3, c_1, c_2, least in pattern.kept:
         held = c_3 * T_3 + c_1 * T_1 + c_2 * T_2 - least
         f, f_end = c_w * w + c_s * s + held, c_w * w_end + c_s * s_end + held
-        if f <= 0.0 or f_end <= 0.0:
+        if not (f > 0.0 and f_end > 0.0):   # nor are they numbers, beyond their range
             return None
         slope, slope_end = c_w * v_w + c_s * v_s, c_w * v_w_end + c_s * v_s_end
         if slope * slope_end < 0.0 and (

@@ -218,8 +218,8 @@ def test_as_a_process_its_parameter_file_loads_and_a_signal_ends_it(ros, layout,
         joints = ros.listen(JointState, '/driveline/joint_states')
         ros.until(lambda: len(joints) > 3)
         assert process.ended(signal.SIGTERM) == 0
-    assert 'Traceback' not in process.errors
-    assert all(word in process.errors for word in [f'{layout} at 200 Hz', *words])
+        assert 'Traceback' not in process.errors
+        assert all(word in process.errors for word in [f'{layout} at 200 Hz', *words])
 
 
 @pytest.mark.parametrize('parameter, words', [
