@@ -9,7 +9,10 @@ shaft holds the shafts together as hard as it is pressed. On ice that brings the
 curve on a dry road it makes the tyres slide. It needs gymnasium, the extra ``gym``.
 """
 
-import gymnasium
+try:
+    import gymnasium
+except ModuleNotFoundError as error:
+    raise ImportError('dm_ros.gym needs gymnasium: pip install "dm_ros[gym]"') from error
 from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space

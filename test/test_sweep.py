@@ -207,7 +207,7 @@ def test_a_function_gets_a_record_of_each_run():
 
 
 def test_what_makes_no_mechanism_and_what_fails_is_told_and_the_rest_goes_on(capsys):
-    Path('IN.csv').write_text('time,carrier,front,rear\n0,3e307,0,0\n0.5,0,0,0\n')
+    Path('IN.csv').write_text('time,carrier,front,rear\n0,3e150,0,0\n0.5,0,0,0\n')
     assert sweep('--vary', 'lsd.clutch.rear.friction_coefficient=0.1,9', '--vary',
                  'lsd.inertia.carrier=1e-6,1e6', '--torques', 'IN.csv', '--metric', 'max.slip',
                  '--loss-law', 'paper') == 0
@@ -350,13 +350,69 @@ def test_the_chunks_follow_from_the_study_alone():
     (['--vary', f'{PRELOAD}=0,1', '--chunk', '0'], '--chunk: 0 is not allowed'),
     (['--vary', f'{PRELOAD}=0,1', '--seed', '-1'], '--seed: -1 is not allowed'),
     (['--vary', f'{PRELOAD}=0,1', '--plot', 'no/OUT.png'], 'no/OUT.png: there is no folder'),
-    (['--vary', f'{PRELOAD}=0,1', '--plot', 'OUT.csv'], 'given for two files'),
+    (['--vary', f'{PRELOAD}=0,1', '--torques', 'OUT.csv'], 'given for two files'),
+    (['--vary', f'{PRELOAD}=0,1', '--plot', 'OUT.jpg'], 'OUT.jpg: its name must end in .png'),
+    (['--vary', f'{PRELOAD}=0,1', '--dt', '1e-9'], 'and at most 10000000'),
 ])
 def test_bad_input_is_named_in_one_line_and_leaves_nothing(arguments, words, capsys):
     assert sweep(*arguments) == 2
     line, = capsys.readouterr().err.splitlines()
     assert line.startswith('sweep: error: ') and words in line
     assert not os.listdir()
+
+
+def test_what_is_not_of_a_sweep_is_left_alone(capsys):
+    parts = Path('OUT.csv.parts')
+    parts.mkdir()
+    (parts / 'notes.txt').write_text('precious')
+    assert sweep('--vary', f'{PRELOAD}=0,1', *SHORT) == 2
+    assert 'OUT.csv.parts: notes.txt in it is not of a sweep' in capsys.readouterr().err
+    assert (parts / 'notes.txt').read_text() == 'precious' and not Path('OUT.csv').exists()
+    shutil.rmtree(parts)
+    Path('elsewhere').mkdir()
+    parts.symlink_to('elsewhere')
+    assert sweep('--vary', f'{PRELOAD}=0,1', *SHORT) == 2
+    assert 'it must be a folder of its own' in capsys.readouterr().err
+    assert sweep('--vary', f'{PRELOAD}=0,1', *SHORT, out='OUT.feather') == 2
+    assert 'OUT.feather: its name must end in .csv or .parquet' in capsys.readouterr().err
+
+
+def test_a_damaged_chunk_is_computed_again_and_what_a_kill_left_is_removed(in_one_go, capsys):
+    process = started(*LONG)
+    wait_for(lambda: len(done()) >= 3, process)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    os.truncate(done()[1], 100)
+    (Path('OUT.csv.parts') / '.00000005.doubles.17.part').write_bytes(b'x')
+    Path('.OUT.csv.17.part').write_bytes(b'x')
+    assert main(LONG) == 0
+    assert Path('OUT.csv').read_bytes() == in_one_go
+    assert sorted(os.listdir()) == ['OUT.csv']
+    process = started(*LONG)
+    wait_for(done, process)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    (Path('OUT.csv.parts') / 'study.json').write_text('{')
+    capsys.readouterr()
+    assert main(LONG) == 2
+    assert 'study.json: it does not tell which study is done there' in capsys.readouterr().err
+
+
+def test_where_nothing_is_done_another_study_may_begin():
+    assert sweep('--vary', f'{PRELOAD}=0,1', *SHORT, '--scheduler', 'tcp://127.0.0.1:1') == 2
+    assert sweep('--vary', f'{PRELOAD}=0,1,2', *SHORT) == 0
+    assert len(table()['status']) == 3
+
+
+@pytest.mark.parametrize('returned, words', [
+    ('None', 'it returned None, a number is needed'), ('"1"', "it returned '1', a number"),
+    ('{"a,b": 1.0}', "it returned the name 'a,b', which must not"),
+    ('{"a": 1j}', 'it returned 1j, a number is needed')])
+def test_what_is_no_number_by_name_is_told(returned, words, capsys):
+    module = f'odd_{abs(hash(returned))}'
+    Path(f'{module}.py').write_text(f'def f(record):\n    return {returned}\n')
+    assert sweep('--vary', f'{PRELOAD}=0,1', *SHORT, '--metric', f'{module}:f') == 2
+    assert words in capsys.readouterr().err
 
 
 def test_speed_ports_are_refused(capsys):

@@ -7,6 +7,15 @@ from contextlib import contextmanager, suppress
 import os
 
 
+def remove_unfinished(path):
+    """Remove what a process that was killed left of a file that it wrote by ``replacing``."""
+    folder, name = os.path.split(os.path.realpath(path))
+    for one in os.listdir(folder):
+        middle = one.removeprefix(f'.{name}.').removesuffix('.part')
+        if one == f'.{name}.{middle}.part' and middle.isdigit():
+            os.unlink(os.path.join(folder, one))
+
+
 @contextmanager
 def replacing(path, mode):
     """

@@ -14,7 +14,7 @@ from threading import Event
 import numpy as np
 
 from dm_ros.ending import run_command, Signalled
-from dm_ros.files.output import replacing
+from dm_ros.files.output import remove_unfinished, replacing
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.plot import require_matplotlib
 from dm_ros.files.recorded_drive import is_bag, read_drive
@@ -30,10 +30,11 @@ from dm_ros.tools.sweeping.cluster import on_cluster
 from dm_ros.tools.sweeping.picture import draw
 from dm_ros.tools.sweeping.samples import axis, grid, spread
 from dm_ros.tools.sweeping.study import Computation, digest, names_of, STATUS, Study
-from dm_ros.tools.sweeping.tables import require_pyarrow, write
+from dm_ros.tools.sweeping.tables import PARQUET, require_pyarrow, write
 from dm_ros.tools.tables import add_ignore_columns, remarks
 
 BUILT_IN_SECONDS = 10.0
+MOST_TICKS = 10**7   # of a load, which is held in memory
 EPILOG = """\
 What is varied, by --vary, once for each parameter of the mechanism or initial_velocity.<shaft>:
   NAME=A,B,C                  these values
@@ -121,9 +122,9 @@ def loaded(arguments, variant, values, is_clutched):
             if getattr(arguments, option):
                 raise ValueError(f'--{option.replace("_", "-")}: it needs --torques')
         seconds = BUILT_IN_SECONDS if arguments.duration is None else arguments.duration
-        if not 0.5 < seconds / simulation.dt < 2**31:
+        if not 0.5 < seconds / simulation.dt <= MOST_TICKS:
             raise ValueError(f'--duration: {seconds!r} is not allowed, it must be a number of s '
-                             'that has ticks')
+                             f'that has a tick of {simulation.dt:g} s, and at most {MOST_TICKS}')
         return simulation, mechanism, np.array([
             mechanism.load(n * simulation.dt) for n in range(round(seconds / simulation.dt))])
     if arguments.duration is not None:
@@ -144,7 +145,11 @@ def loaded(arguments, variant, values, is_clutched):
     for line in told:
         print('sweep:', line, file=sys.stderr)
     try:
-        return simulation, mechanism, np.array(list(table.held(simulation.dt)))
+        held = table.held(simulation.dt)
+        if len(held) > MOST_TICKS:
+            raise ValueError(f'{len(held)} ticks of {simulation.dt:g} s, at most {MOST_TICKS} are '
+                             'allowed; --dt makes them longer')
+        return simulation, mechanism, np.array(list(held))
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
 
@@ -243,7 +248,7 @@ class Sweep:
 
     def compute(self, chunks, scheduler):
         """Compute and keep the chunks that are not done."""
-        left = [number for number in self.numbers if not chunks.has(number)]
+        left = [number for number in self.numbers if not chunks.has(number, self.size(number))]
         done = self.count - sum(map(self.size, left))
         if done:
             print(f'sweep: {done} of {self.count} sets are done already', file=sys.stderr)
@@ -269,6 +274,9 @@ def run(arguments):
     if arguments.plot:
         require_matplotlib()   # before a run that may take hours
     require_pyarrow(arguments.out)
+    for path, endings in ((arguments.out, ('.csv', PARQUET)), (arguments.plot, ('.png',))):
+        if path and os.path.splitext(path)[1] not in endings and not path.startswith('/dev/'):
+            raise ValueError(f'{path}: its name must end in {" or ".join(endings)}')
     files = [os.path.realpath(path) for path in (
         arguments.torques, arguments.params, arguments.out, arguments.plot) if path]
     if len(set(files)) < len(files):
@@ -305,6 +313,8 @@ def run(arguments):
             with replacing(arguments.plot, 'wb') as picture:
                 draw(picture, {one: columns[one.name] for one in axes}, dict(zip(
                     sweep.study.names, tables.T)), f'{variant}, {sweep.count} sets')
+        for path in filter(None, (arguments.out, arguments.plot)):
+            remove_unfinished(path)   # what a kill before this run had left
         chunks.remove()
     counts = np.bincount(tables[:, -1].astype(int), minlength=len(STATUS))
     print(f'sweep: {sweep.count} sets, {len(sweep.study.torques)} ticks each: ' + ', '.join(

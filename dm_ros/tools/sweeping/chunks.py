@@ -12,6 +12,7 @@ from contextlib import contextmanager
 import fcntl
 import json
 import os
+import re
 import shutil
 
 import numpy as np
@@ -19,6 +20,8 @@ import numpy as np
 from dm_ros.files.output import replacing
 
 MANIFEST = 'study.json'
+OURS = re.compile(rf'{re.escape(MANIFEST)}|[0-9]{{8,}}\.doubles')
+UNFINISHED = re.compile(rf'\.({OURS.pattern})\.[0-9]+\.part')   # see ``replacing``
 
 
 @contextmanager
@@ -30,6 +33,9 @@ def chunks_of(folder, description, width):
     :raises ValueError: where the chunks there are those of another study, or another process is
         at work in the folder.
     """
+    if os.path.islink(folder) or os.path.exists(folder) and not os.path.isdir(folder):
+        raise ValueError(f'{folder}: it must be a folder of its own for what is done; remove it, '
+                         'or name another --out')
     os.makedirs(folder, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -39,14 +45,29 @@ def chunks_of(folder, description, width):
             raise ValueError(f'{folder}: another sweep is at work there') from None
         manifest = os.path.join(folder, MANIFEST)
         description = json.loads(json.dumps(description))
-        if os.path.exists(manifest):
-            with open(manifest, encoding='utf-8') as file:
-                _check_same(folder, json.load(file), description)
-        else:
+        for name in os.listdir(folder):   # what a kill left of a file that was being written
+            if UNFINISHED.fullmatch(name):
+                os.unlink(os.path.join(folder, name))
+        others = [name for name in os.listdir(folder) if not OURS.fullmatch(name)]
+        if others:
+            raise ValueError(f'{folder}: {others[0]} in it is not of a sweep; remove the folder, '
+                             'or name another --out')
+        if any(name != MANIFEST for name in os.listdir(folder)):
+            _check_same(folder, _read(manifest), description)
+        else:   # nothing is done there
             _write(manifest, json.dumps(description, indent=1).encode())
         yield Chunks(folder, width)
     finally:
         os.close(handle)
+
+
+def _read(manifest):
+    try:
+        with open(manifest, encoding='utf-8') as file:
+            return dict(json.load(file))
+    except (OSError, ValueError) as error:
+        raise ValueError(f'{manifest}: it does not tell which study is done there ({error}); '
+                         'remove the folder, or name another --out') from None
 
 
 def _check_same(folder, before, now):
@@ -65,9 +86,12 @@ class Chunks:
     def _path(self, number):
         return os.path.join(self._folder, f'{number:08d}.doubles')
 
-    def has(self, number):
-        """Return whether a chunk is done."""
-        return os.path.exists(self._path(number))
+    def has(self, number, size):
+        """Return whether a chunk of so many sets is done."""
+        try:
+            return os.path.getsize(self._path(number)) == 8 * self._width * size
+        except FileNotFoundError:
+            return False
 
     def load(self, number):
         """Return the array of a chunk."""

@@ -9,6 +9,7 @@ What is summed is summed tick by tick, so that no bit depends on how many sets a
 
 from importlib import import_module
 import os
+import re
 import sys
 import traceback
 
@@ -20,6 +21,7 @@ from dm_ros.mechanism.kinetic import energy_gained, kinetic_form
 QUANTITIES = 'velocity', 'position', 'moment', 'power_flow', 'clutch_force'
 STATISTICS = 'final', 'mean', 'min', 'max', 'peak', 'rms'
 OTHERS = 'lost_energy', 'locked'
+NAME = re.compile(r'[^,"\r\n]+')   # of a column
 LOCKED = 1.0   # rad/s of slip, below which the output shafts count as locked
 
 
@@ -173,9 +175,16 @@ def called(name, function, record):
     """Return what a function of the user makes of a ``Record``, ``{name: number}``."""
     try:
         found = function(record)
-        named = found if hasattr(found, 'items') else {name.partition(':')[2]: found}
-        return {str(key): float(value) for key, value in named.items()}
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         raise ValueError(f'--metric: {name}: {type(error).__name__}: {error}, in '
                          f'{place.filename}:{place.lineno}') from None
+    named = found if hasattr(found, 'items') else {name.partition(':')[2]: found}
+    for key, value in named.items():
+        if not NAME.fullmatch(str(key)):
+            raise ValueError(f'--metric: {name}: it returned the name {key!r}, which must not '
+                             'have commas, quotes or line breaks')
+        if not isinstance(value, (int, float, np.number, np.bool_)):
+            raise ValueError(f'--metric: {name}: it returned {value!r}, a number is needed, or '
+                             'numbers by name')
+    return {str(key): float(value) for key, value in named.items()}
