@@ -13,6 +13,8 @@
 enum { HELD = 6, STATE = 7, SOLVED = 17, LOST = 8, KEPT = 8 };
 enum { SHAFTS = 5, PORTS = 3, MOMENTS = 5, CLUTCHES = 2 };   /* at most */
 
+static const double FASTEST = 1e150;   /* rad/s^2, of which squares are still numbers */
+
 #define REAL double
 #define OF(name) name
 #include "types.h"

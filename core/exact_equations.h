@@ -50,7 +50,7 @@ static inline MASK holds(const OF(way) *p, OF(pair) x, const REAL *T, OF(pair) e
     const REAL v_w = a[0] * x.w + a[1] * x.s + b_w, v_s = b[0] * x.w + b[1] * x.s + b_s;
     const REAL v_w_end = a[0] * end.w + a[1] * end.s + b_w;
     const REAL v_s_end = b[0] * end.w + b[1] * end.s + b_s;
-    MASK all = opposite(T[0] * p->input_sign < 0.0);
+    MASK all = opposite(T[0] * p->input_sign < 0.0) & (absolute(v_w) + absolute(v_s) < FASTEST);
     for (int n = 0; n < KEPT && any(all); n++) {
         const REAL *c = p->kept[n];
         const REAL held = c[2] * T[0] + c[3] * T[1] + c[4] * T[2] - c[5];

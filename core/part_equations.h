@@ -6,7 +6,7 @@
  * EVALUATE, JACOBIAN, BENDS and APPLY_PHI_2 are those of its includer.
  */
 
-static const double BACKWARD = 3.0, SAFETY = 0.8, SHRINK = 0.1, GROW = 5.0, FASTEST = 1e150;
+static const double BACKWARD = 3.0, SAFETY = 0.8, SHRINK = 0.1, GROW = 5.0;
 
 /* Return h (3 I - |h| J)^-1 (f(there) - f(here) - J d) of two points that are d apart. */
 static OF(pair) nonlinear_part(OF(step) *job, const OF(point) *here, const OF(point) *there,

@@ -113,13 +113,13 @@ static REAL solve(OF(step) *job, REAL q_1, REAL q_2, OF(signs) sign, OF(signs) *
 }
 
 /* Put the sign of each speed, smooth around zero, and of the slip in the clutches into state. */
-static void find_signs(const OF(step) *job, REAL w, REAL s, REAL *state)
+static void find_signs(OF(step) *job, REAL w, REAL s, REAL *state)
 {
     const OF(coefficients) *k = job->coefficients;
     const REAL k_1s = k->k_1 * s, k_2s = k->k_2 * s;
-    state[2] = tanh_of(w / k->sign_speed);
-    state[3] = tanh_of((w + k_1s) / k->sign_speed);
-    state[4] = tanh_of((w - k_2s) / k->sign_speed);
+    state[2] = tanh_of(OF(quotient)(job, w, k->sign_speed));
+    state[3] = tanh_of(OF(quotient)(job, w + k_1s, k->sign_speed));
+    state[4] = tanh_of(OF(quotient)(job, w - k_2s, k->sign_speed));
     state[5] = tanh_of(k->a_1 * s);
     state[6] = tanh_of(k->a_2 * s);
 }
@@ -152,8 +152,8 @@ static OF(matrix) jacobian_at(OF(step) *job, const OF(point) *at)
     const REAL X = v[8], a_N = v[9], a_X = v[10], G_11 = v[12], G_12 = v[13], G_21 = v[14];
     const REAL G_22 = v[15], det = v[16];
     const REAL one = fill(1.0), none = fill(0.0);
-    const REAL n_1w = k->half_1 * s_1 * (1 - sigma_1 * sigma_1) / k->sign_speed;
-    const REAL n_2w = k->half_2 * s_2 * (1 - sigma_2 * sigma_2) / k->sign_speed;
+    const REAL n_1w = OF(quotient)(job, k->half_1 * s_1 * (1 - sigma_1 * sigma_1), k->sign_speed);
+    const REAL n_2w = OF(quotient)(job, k->half_2 * s_2 * (1 - sigma_2 * sigma_2), k->sign_speed);
     const REAL n_1s = n_1w * k->k_1, n_2s = -n_2w * k->k_2;
     const REAL u_1 = k->a_1 * (1 - t_1 * t_1), u_2 = k->a_2 * (1 - t_2 * t_2);
     const REAL phi_1 = pick(s_1 > 0.0, k->phi_1, k->psi_1);
@@ -167,7 +167,7 @@ static OF(matrix) jacobian_at(OF(step) *job, const OF(point) *at)
     REAL g_w = (M_1 * a_N * n_1w + y_1 * M_1w + M_2 * a_N * n_2w + y_2 * M_2w + a_X * k->l_0);
     const REAL g_s = (M_1 * (a_N * n_1s - a_X * x_1s) + y_1 * M_1s
                       + M_2 * (a_N * n_2s - a_X * x_2s) + y_2 * M_2s - a_X * (q_1s + q_2s));
-    const REAL sigma_w = (1 - sigma_0 * sigma_0) / k->sign_speed;
+    const REAL sigma_w = OF(quotient)(job, 1 - sigma_0 * sigma_0, k->sign_speed);
     const MASK has_drive = k->g_F != 0.0, turns = sigma_w != 0.0;
     if (any(has_drive | turns)) {
         const REAL side = pick(w < 0.0, -one, one);

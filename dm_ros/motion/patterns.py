@@ -19,6 +19,7 @@ from dm_ros.mechanism import passive
 from dm_ros.mechanism.losses import SymmetricLosses
 from dm_ros.mechanism.symmetric import Moments
 from dm_ros.motion import held_torque
+from dm_ros.motion.adaptive import FASTEST
 from dm_ros.motion.held_torque import Exact, held_torque_step_by_floats
 from dm_ros.motion.quadrature import second_moment_of_the_way
 
@@ -162,6 +163,8 @@ def exact_step(pattern, x, T):
     b_w = B_w3 * T_3 + B_w1 * T_1 + B_w2 * T_2
     b_s = B_s3 * T_3 + B_s1 * T_1 + B_s2 * T_2
     v_w, v_s = A_ww * w + A_ws * s + b_w, A_sw * w + A_ss * s + b_s
+    if not abs(v_w) + abs(v_s) < FASTEST:
+        return None
     v_w_end = A_ww * w_end + A_ws * s_end + b_w
     v_s_end = A_sw * w_end + A_ss * s_end + b_s
     reach, reach_end = pattern.reach
