@@ -374,7 +374,12 @@ class Run(NamedTuple):
 
 
 # Sizes with which the difference quotients of the Jacobian and the tolerances are taken.
-SCALES = {'twist': 1e-2, 'pad': 1.0, 'kappa': 0.1, 'alpha': 0.1, 'position': 1.0}
+SCALES = {'twist': 1e-2, 'kappa': 0.1, 'alpha': 0.1}
+
+
+def scale(name):
+    """Return what counts as a large value of a state."""
+    return SCALES.get(name.rpartition('.')[2], 1.0)
 
 
 def integrate(car, state, changes, duration, rtol=1e-8, atol=1e-10, method='Radau'):
@@ -387,7 +392,7 @@ def integrate(car, state, changes, duration, rtol=1e-8, atol=1e-10, method='Rada
     :param atol: relative to the size of a state.
     """
     names = [*car.names, 'position']
-    scale = np.array([SCALES.get(name.rpartition('.')[2], 1.0) for name in names])
+    scales = np.array([scale(name) for name in names])
     y = np.array([state.get(name, 0.0) for name in names])
     inputs = dict(DEFAULT_INPUTS)
     bounds = [time for time, _ in changes] + [duration]
@@ -406,13 +411,13 @@ def integrate(car, state, changes, duration, rtol=1e-8, atol=1e-10, method='Rada
             result = np.zeros((len(y), len(y)))
             for i in range(len(y) - 1):   # nothing depends on the position
                 moved = y.copy()
-                moved[i] += 1e-7 * scale[i]
+                moved[i] += 1e-7 * scales[i]
                 result[:, i] = (slope(t, moved) - at) / (moved[i] - y[i])
             return result
 
         grid = np.arange(round(begin * 1000), round(end * 1000)) / 1000.0
         solution = solve_ivp(slope, (begin, end), y, method=method, dense_output=True, rtol=rtol,
-                             atol=atol * scale, jac=jacobian)
+                             atol=atol * scales, jac=jacobian)
         if not solution.success:
             raise ArithmeticError(solution.message)
         times += grid.tolist()
@@ -435,3 +440,29 @@ def run(name, **tolerances):
     first = {**DEFAULT_INPUTS, **scenario.changes[0][1]}
     return integrate(car, car.rolling(scenario.speed, first['grade']), scenario.changes,
                      scenario.duration, **tolerances)
+
+
+def books(run):
+    """
+    Return (work, losses, parametric, change) of a run in J: work and losses by kind.
+
+    ``change`` is that of the energy while inputs were held: where an input changes the stored
+    energy at once, as a brake pressure does, that jump is in none of the four.
+    """
+    names = [*run.car.names, 'position']
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    work, losses, parametric, change = {}, {}, 0.0, 0.0
+    for begin, end, inputs, solution in run.pieces:
+        def at(time, solution=solution):
+            return dict(zip(names, solution.sol(time).tolist()))
+        change += run.car.energy(at(end), inputs) - run.car.energy(at(begin), inputs)
+        for start, stop in zip(solution.t[:-1], solution.t[1:]):
+            for node, weight in zip(nodes, weights):
+                state = at((start + stop + node * (stop - start)) / 2.0)
+                derivatives, look = run.car.evaluate(state, inputs)
+                share = weight * (stop - start) / 2.0
+                parametric += share * run.car.parametric(state, inputs, derivatives)
+                for sums, powers in ((work, look['work']), (losses, look['losses'])):
+                    for kind, power in powers.items():
+                        sums[kind] = sums.get(kind, 0.0) + share * power
+    return work, losses, parametric, change
