@@ -311,7 +311,7 @@ def test_the_books_of_hill_axle_ice_close():
     kinds = ('input', 'slope', 'wind')
     total = sum(work[kind] for kind in kinds)
     assert total == pytest.approx(change - parametric + sum(losses.values()),
-                                  abs=1e-6 * sum(abs(work[kind]) for kind in kinds))
+                                  abs=1e-8 * sum(abs(work[kind]) for kind in kinds))
     assert all(loss >= 0.0 for loss in losses.values())
     assert losses['tyres'] > 0.0 and losses['centre_clutches'] > 0.0
 
