@@ -12,6 +12,8 @@ import math
 from math import hypot, tan, tanh
 from typing import NamedTuple
 
+from scipy.optimize import brentq
+
 CENTRE = {   # Table 2, the crown radii and the clutches as assumed
     'crown_radius.front': 0.040, 'crown_radius.rear': 0.060, 'satellite_ratio': 10 / 24,
     'satellite_count': 4,
@@ -52,6 +54,48 @@ def plus(value):
 
 def sign(value):
     return float(value > 0.0) - float(value < 0.0)
+
+
+def newton(evaluate, e_0, ds, enough):
+    """Return (e_0, ds, residual), where no step that is halved up to 13 times gets nearer."""
+    one, two = evaluate(e_0, ds)[:2]
+    for _ in range(100):
+        size = hypot(one, two)
+        if size <= enough:
+            break
+        h = 1e-3 * (1.0 + abs(e_0))
+        h_s = 1e-3 * (1.0 + abs(ds))
+        one_0, two_0 = evaluate(e_0 + h, ds)[:2]
+        one_s, two_s = evaluate(e_0, ds + h_s)[:2]
+        a, b = (one_0 - one) / h, (one_s - one) / h_s
+        c, d = (two_0 - two) / h, (two_s - two) / h_s
+        determinant = a * d - b * c
+        step, step_s = (b * two - d * one) / determinant, (c * one - a * two) / determinant
+        for _ in range(14):
+            new_one, new_two = evaluate(e_0 + step, ds + step_s)[:2]
+            if hypot(new_one, new_two) < size:
+                break
+            step, step_s = step / 2.0, step_s / 2.0
+        else:
+            break
+        e_0, ds, one, two = e_0 + step, ds + step_s, new_one, new_two
+    return e_0, ds, hypot(one, two)
+
+
+def nested_roots(evaluate):
+    """Return (e_0, ds): for each e_0 the second equation has one ds, and then the first one."""
+    def slip(e_0):
+        return root(lambda ds: evaluate(e_0, ds)[1])
+    e_0 = root(lambda e_0: evaluate(e_0, slip(e_0))[0])
+    return e_0, slip(e_0)
+
+
+def root(function):
+    """Return the zero of a continuous function that changes its sign once."""
+    end = 1.0
+    while function(end) * function(-end) > 0.0:
+        end *= 10.0
+    return brentq(function, -end, end, xtol=1e-12, rtol=1e-14)
 
 
 class Solution(NamedTuple):
@@ -122,33 +166,11 @@ class Differential:
         """Return the one solution of the law of losses."""
         evaluate = self._law(omega_0, s, torque_in, torques_out, forces)
         scale = 1.0 + abs(torque_in) + sum(map(abs, torques_out)) + sum(map(abs, forces))
-        e_0 = ds = 0.0
-        one, two = evaluate(e_0, ds)[:2]
-        for _ in range(100):
-            size = hypot(one, two)
-            if size <= 4e-16 * scale:
-                break
-            h = 1e-3 * (1.0 + abs(e_0))
-            h_s = 1e-3 * (1.0 + abs(ds))
-            one_0, two_0 = evaluate(e_0 + h, ds)[:2]
-            one_s, two_s = evaluate(e_0, ds + h_s)[:2]
-            a, b = (one_0 - one) / h, (one_s - one) / h_s
-            c, d = (two_0 - two) / h, (two_s - two) / h_s
-            determinant = a * d - b * c
-            step, step_s = (b * two - d * one) / determinant, (c * one - a * two) / determinant
-            share = 1.0
-            while True:
-                one, two = evaluate(e_0 + share * step, ds + share * step_s)[:2]
-                if hypot(one, two) < size:
-                    e_0, ds = e_0 + share * step, ds + share * step_s
-                    break
-                share /= 2.0
-                if share < 1e-4:
-                    break
-            if share < 1e-4:   # as small as rounding lets it be
-                if size > 1e-10 * scale:
-                    raise ArithmeticError(f'no solution: {size} is left')
-                break
+        e_0, ds, left = newton(evaluate, 0.0, 0.0, 4e-16 * scale)
+        if left > 1e-10 * scale:   # rare: stuck where pieces meet
+            e_0, ds, left = newton(evaluate, *nested_roots(evaluate), 4e-16 * scale)
+        if left > 1e-10 * scale:
+            raise ArithmeticError(f'no solution: {left} is left')
         moments, losses = evaluate(e_0, ds)[2:]
         return Solution(e_0, ds, moments, losses)
 
