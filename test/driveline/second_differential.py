@@ -56,23 +56,23 @@ def sign(value):
     return float(value > 0.0) - float(value < 0.0)
 
 
-def newton(evaluate, e_0, ds, enough):
+def newton(residuals, e_0, ds, enough):
     """Return (e_0, ds, residual), where no step that is halved up to 13 times gets nearer."""
-    one, two = evaluate(e_0, ds)[:2]
+    one, two = residuals(e_0, ds)
     for _ in range(100):
         size = hypot(one, two)
         if size <= enough:
             break
         h = 1e-3 * (1.0 + abs(e_0))
         h_s = 1e-3 * (1.0 + abs(ds))
-        one_0, two_0 = evaluate(e_0 + h, ds)[:2]
-        one_s, two_s = evaluate(e_0, ds + h_s)[:2]
+        one_0, two_0 = residuals(e_0 + h, ds)
+        one_s, two_s = residuals(e_0, ds + h_s)
         a, b = (one_0 - one) / h, (one_s - one) / h_s
         c, d = (two_0 - two) / h, (two_s - two) / h_s
         determinant = a * d - b * c
         step, step_s = (b * two - d * one) / determinant, (c * one - a * two) / determinant
         for _ in range(14):
-            new_one, new_two = evaluate(e_0 + step, ds + step_s)[:2]
+            new_one, new_two = residuals(e_0 + step, ds + step_s)
             if hypot(new_one, new_two) < size:
                 break
             step, step_s = step / 2.0, step_s / 2.0
@@ -82,11 +82,11 @@ def newton(evaluate, e_0, ds, enough):
     return e_0, ds, hypot(one, two)
 
 
-def nested_roots(evaluate):
+def nested_roots(residuals):
     """Return (e_0, ds): for each e_0 the second equation has one ds, and then the first one."""
     def slip(e_0):
-        return root(lambda ds: evaluate(e_0, ds)[1])
-    e_0 = root(lambda e_0: evaluate(e_0, slip(e_0))[0])
+        return root(lambda ds: residuals(e_0, ds)[1])
+    e_0 = root(lambda e_0: residuals(e_0, slip(e_0))[0])
     return e_0, slip(e_0)
 
 
@@ -164,18 +164,17 @@ class Differential:
 
     def solve(self, omega_0, s, torque_in, torques_out, forces):
         """Return the one solution of the law of losses."""
-        evaluate = self._law(omega_0, s, torque_in, torques_out, forces)
+        residuals, report = self._law(omega_0, s, torque_in, torques_out, forces)
         scale = 1.0 + abs(torque_in) + sum(map(abs, torques_out)) + sum(map(abs, forces))
-        e_0, ds, left = newton(evaluate, 0.0, 0.0, 4e-16 * scale)
+        e_0, ds, left = newton(residuals, 0.0, 0.0, 1e-14 * scale)
         if left > 1e-10 * scale:   # rare: stuck where pieces meet
-            e_0, ds, left = newton(evaluate, *nested_roots(evaluate), 4e-16 * scale)
+            e_0, ds, left = newton(residuals, *nested_roots(residuals), 1e-14 * scale)
         if left > 1e-10 * scale:
             raise ArithmeticError(f'no solution: {left} is left')
-        moments, losses = evaluate(e_0, ds)[2:]
-        return Solution(e_0, ds, moments, losses)
+        return Solution(e_0, ds, *report(e_0, ds))
 
     def _law(self, omega_0, s, torque_in, torques_out, forces):
-        """Return a function of (e_0, ds): two residuals, the moments, the losses."""
+        """Return two functions of (e_0, ds): what is to be zero, and what there is to tell."""
         omega = self.outputs(omega_0, s)
         sigma_0 = tanh(omega_0 / self.sign_speed)
         sigma = [tanh(speed / self.sign_speed) for speed in omega]
@@ -228,29 +227,39 @@ class Differential:
             M_F = N_F / (mean + half * sigma_0 * sign(N_F))        # M has the sign of N
             return M_F, mean * M_F - half * abs(M_F) * sigma_0, D_3
 
-        def evaluate(e_0, ds):
+        def moments(e_0, ds):
+            """Return all internal moments."""
             e = self.outputs(e_0, ds)
             (M_1, N_1, F_1), (M_2, N_2, F_2) = side(0, e[0]), side(1, e[1])
             M_F, C, D_3 = final_drive(e_0) if self.is_axle else (0.0, torque_in, 0.0)
             reaction = L_0 - L[0] - L[1] - F_1 - F_2
             bracket = plus(d * (N_1 + N_2)) + plus(-d * C) + d * reaction
             D_0 = beta * sigma_0 * plus(bracket)
-            carrier = self.I_0 * e_0 - C + N_1 + N_2 + reaction + D_0
-            satellites = self.g_12 * N_1 - N_2 + satellite * (self.I_s * ds + self.l_s * s)
-            losses = {
-                'meshes': sum((1.0 - self.eta[k]) * abs(M) * sigma[k] * omega[k]
-                              for k, M in ((0, M_1), (1, M_2))),
-                'bearings': D_0 * omega_0,
-                'clutches': sum(F * (omega[k] - omega_0) for k, F in ((0, F_1), (1, F_2))),
-                'drag': (L_0 * omega_0 + sum(L[k] * (omega[k] - omega_0) for k in (0, 1))
-                         + self.n_s * self.l_s * omega_s**2)}
-            moments = (M_1, M_2, F_1, F_2)
-            if self.is_axle:
-                omega_3 = self.g_F * omega_0
-                losses['meshes'] += (1.0 - self.eta_FG) * abs(M_F) * sigma_0 * omega_0
-                losses['bearings'] += D_3 * omega_3
-                losses['drag'] += self.l_3 * omega_3**2
-                moments = (M_F, *moments)
-            return carrier, satellites, moments, losses
+            return M_1, M_2, M_F, N_1, N_2, F_1, F_2, C, reaction, D_0, D_3
 
-        return evaluate
+        def residuals(e_0, ds):
+            """Return what is left of the equations of the carrier and of the satellites."""
+            _, _, _, N_1, N_2, _, _, C, reaction, D_0, _ = moments(e_0, ds)
+            return (self.I_0 * e_0 - C + N_1 + N_2 + reaction + D_0,
+                    self.g_12 * N_1 - N_2 + satellite * (self.I_s * ds + self.l_s * s))
+
+        def report(e_0, ds):
+            """Return the moments as the interface has them, and the losses."""
+            M_1, M_2, M_F, _, _, F_1, F_2, _, _, D_0, D_3 = moments(e_0, ds)
+            slips = [speed - omega_0 for speed in omega]
+            losses = {
+                'meshes': sum((1.0 - eta) * abs(M) * z * speed
+                              for eta, M, z, speed in zip(self.eta, (M_1, M_2), sigma, omega)),
+                'bearings': D_0 * omega_0,
+                'clutches': F_1 * slips[0] + F_2 * slips[1],
+                'drag': (L_0 * omega_0 + L[0] * slips[0] + L[1] * slips[1]
+                         + self.n_s * self.l_s * omega_s**2)}
+            if not self.is_axle:
+                return (M_1, M_2, F_1, F_2), losses
+            omega_3 = self.g_F * omega_0
+            losses['meshes'] += (1.0 - self.eta_FG) * abs(M_F) * sigma_0 * omega_0
+            losses['bearings'] += D_3 * omega_3
+            losses['drag'] += self.l_3 * omega_3**2
+            return (M_F, M_1, M_2, F_1, F_2), losses
+
+        return residuals, report
