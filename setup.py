@@ -45,7 +45,7 @@ setup(
         'gym': ['gymnasium>=1.1'],
         'mcap': ['mcap-ros2-support'],
         'parquet': ['pyarrow>=14'],
-        'physics': ['mujoco>=4'],
+        'physics': ['mujoco>=4', 'rumoca==0.10.2'],
         'plot': [MATPLOTLIB],
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'test': ['hypothesis', 'pytest', 'pytest-xdist', MATPLOTLIB],
