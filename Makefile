@@ -1,6 +1,6 @@
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run watch test test-long lint bench bench-sweep bench-loop bench-restarts soak compare docs colcon test-jazzy-versions clean
+.PHONY: help setup run drive watch test test-long lint bench bench-sweep bench-loop bench-restarts soak compare docs colcon test-jazzy-versions clean
 
 PYTHON = python3
 VARIANT = symmetric_ode
@@ -72,6 +72,11 @@ setup: .venv/$(ROS)  ## make .venv, with a sourced ROS 2 or else with its wheels
 run: setup  ## run the demo: VARIANT, LOSS_LAW, DURATION in s, RATE in Hz, OUT a folder
 	@echo "running the demo: $(DURATION) s and some"
 	.venv/bin/demo --variant $(VARIANT) --loss-law $(LOSS_LAW) --duration $(DURATION) --rate $(RATE) --out $(OUT)
+
+drive: setup  ## run the demo of a driveline: a start on ice, a picture and bags in OUT
+	@echo "driving twice: some seconds"
+	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST MPLBACKEND=Agg \
+	  .venv/bin/python examples/driveline_controllers.py --drive --out $(OUT)
 
 watch: setup  ## serve a page that shows a running node: PORT, WATCH_ARGS such as --control
 	ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST .venv/bin/watch --port $(PORT) $(WATCH_ARGS)
