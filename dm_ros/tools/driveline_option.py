@@ -10,6 +10,8 @@ from dm_ros.driveline_plant import all_rows, DrivelineNodeParameters, make_drive
 from dm_ros.files.parameter_file import missing, read_parameter_file
 
 NODE = '/driveline'
+SEVERAL = 'a driveline is made of several differentials'   # why no single one can be named
+NOT_A_DRIVELINE = 'only a driveline has that, see --driveline'
 OF_FILE = True   # what the option is without a layout
 
 

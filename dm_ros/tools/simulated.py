@@ -22,12 +22,16 @@ from dm_ros.files.recorded_drive import is_bag, read_drive
 from dm_ros.files.torque_table import read_input_file, read_torque_file
 from dm_ros.motion.simulation import NO_FORCE
 from dm_ros.settings import make_simulation, NodeParameters
-from dm_ros.tools.driveline_option import driveline_values, layout_of, refuse
+from dm_ros.tools.driveline_option import (
+    driveline_values,
+    layout_of,
+    NOT_A_DRIVELINE,
+    refuse,
+    SEVERAL,
+)
 from dm_ros.tools.passed_over import warn
 
-ONE_MECHANISM = 'a driveline is made of several differentials'
 NO_BAG = 'no bag of a driveline is written or read; record the node driveline by ros2 bag'
-NOT_A_DRIVELINE = 'only a driveline has that, see --driveline'
 STEER = {'steer': ', the car cannot turn without --planar'}
 
 
@@ -138,7 +142,7 @@ class DrivelineRun:
 
     def __init__(self, arguments):
         refuse(arguments, {
-            '--variant': ONE_MECHANISM, '--loss-law': 'a driveline has the passive law alone',
+            '--variant': SEVERAL, '--loss-law': 'a driveline has the passive law alone',
             '--bag': NO_BAG, '--node': NO_BAG})
         if is_bag(arguments.torques):
             raise ValueError(f'{arguments.torques}: {NO_BAG}')
