@@ -4,6 +4,7 @@
 """The tool ``simulate`` with a driveline: its columns, its numbers, and what it refuses."""
 
 import csv
+from pathlib import Path
 
 from drivelines import DIFFERENTIALS
 import numpy as np
@@ -13,6 +14,7 @@ from dm_ros import Driveline
 from dm_ros.files.driveline_record import driveline_columns, driveline_row, DrivelineRecord
 from dm_ros.tools.simulate import main
 
+PAGE = Path(__file__).parents[1] / 'doc' / 'driveline.md'
 WHEELS = 'front_left', 'front_right', 'rear_left', 'rear_right'
 GOOD = ('time,rear_left_grip,input,front_left_brake\n0,0.3,300,0\n0.05,1,-20,150\n0.1,1,0,0\n')
 # of an axle with clutches, in words of any layout
@@ -328,6 +330,29 @@ def test_many_ticks_are_told_before_and_too_many_are_refused(folder, capfd, monk
     size = float(told.removeprefix(words).split()[0]) * 1e3
     assert size / 1.5 < (folder / 'OUT.csv').stat().st_size < size * 1.5
     refused(folder, capfd, 'IN.csv: time: 200 ticks of 0.0005 s, about ', '--dt', 0.0005)
+
+
+def test_the_table_of_the_page_runs_and_its_wheels_on_ice_spin(folder):
+    """On the road again all roll as one, until a brake holds one of them."""
+    lines = PAGE.read_text().splitlines()
+    begin = next(n for n, line in enumerate(lines) if line.startswith('    time,input,'))
+    table = [line.strip() for line in lines[begin:lines.index('', begin)]]
+    (folder / 'IN.csv').write_text('\n'.join(table))
+    assert simulate('--dt', 0.001, '--out', 'OUT.csv') == 0
+    header, rows = written()
+    assert len(rows) == 4001
+    left, right, brake = (header.index(f'velocity.{wheel}') for wheel in (
+        'front_left', 'front_right', 'rear_left'))
+    assert rows[1499][left] > 2.0 * rows[1499][right]
+    assert rows[2999][left] == pytest.approx(rows[2999][right], rel=0.01)
+    assert rows[3200][brake] < 0.1 < 5.0 < rows[3200][right]
+
+
+def test_the_page_names_all_columns():
+    text = PAGE.read_text()
+    text = text[text.index('## Tools'):text.index('## Limits')]
+    for name in driveline_columns(Driveline('awd')):
+        assert f'`{name.partition(".")[0]}' in text, name
 
 
 def test_draws_a_picture_alone_and_equal_runs_equal_ones(folder, capfd):
