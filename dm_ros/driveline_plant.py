@@ -61,7 +61,8 @@ def passed_over(values):
     """
     settings = DrivelineNodeParameters().changed(DrivelineNodeParameters.part_of(values))
     counting = rows_of(settings.layout).keys() | settings.named().keys()
-    others = [name for name in values if name in all_rows() and name not in counting]
+    of_others = all_rows().keys() - counting
+    others = [name for name in values if name in of_others]
     if not others:
         return None
     return (f'{len(others)} parameter{"s" if len(others) > 1 else ""} of another layout than '

@@ -4,7 +4,12 @@
 """The tool ``simulate`` with a driveline: its columns, its numbers, and what it refuses."""
 
 import csv
+import os
 from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
 
 from drivelines import DIFFERENTIALS
 import numpy as np
@@ -361,3 +366,48 @@ def test_draws_a_picture_alone_and_equal_runs_equal_ones(folder, capfd):
     assert (folder / 'a.png').read_bytes().startswith(b'\x89PNG')
     assert (folder / 'a.png').read_bytes() == (folder / 'b.png').read_bytes()
     assert not capfd.readouterr().out and not list(folder.glob('*.csv'))[1:]
+
+
+@pytest.mark.skipif(not os.path.exists('/dev/full'), reason='needs /dev/full')
+def test_a_full_disk_is_named(folder, capfd):
+    refused(folder, capfd, '/dev/full: No space left on device', '--out', '/dev/full')
+
+
+def test_without_a_file_the_csv_goes_to_stdout(folder, capfd):
+    assert simulate('--out', 'OUT.csv') == 0
+    capfd.readouterr()
+    assert simulate() == 0
+    assert capfd.readouterr().out == (folder / 'OUT.csv').read_text()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_nothing_behind(folder, monkeypatch, number):
+    # the tool as a process finds the package where this one does
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(path or os.getcwd() for path in sys.path))
+    (folder / 'IN.csv').write_text(GOOD.replace('\n0.1,', '\n5e3,'))
+    (folder / 'OUT.csv').write_text('precious')
+    before = set(folder.iterdir())
+    process = subprocess.Popen(   # a shell's background job, as a test run may be, ignores SIGINT
+        [sys.executable, '-m', 'dm_ros.tools.simulate', '--driveline', 'awd', '--torques',
+         'IN.csv', '--out', 'OUT.csv'], stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+    try:
+        end = time.monotonic() + 60.0
+        while not any(path.suffix == '.part' for path in folder.iterdir()):
+            assert time.monotonic() < end and process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60.0)
+    finally:
+        process.kill()
+    assert process.returncode == 128 + number and not err
+    assert set(folder.iterdir()) == before
+    assert (folder / 'OUT.csv').read_text() == 'precious'
+
+
+def test_the_tool_loads_neither_ros_nor_matplotlib(monkeypatch):
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(path or os.getcwd() for path in sys.path))
+    check = ('import sys\nfrom dm_ros.tools.simulate import main\n'
+             'assert main("--driveline awd --torques IN.csv --out OUT.csv".split()) == 0\n'
+             'assert not {"rclpy", "matplotlib"} & set(sys.modules), sys.modules')
+    subprocess.run([sys.executable, '-c', check], check=True)
