@@ -52,6 +52,24 @@ def all_rows():
     return rows
 
 
+def passed_over(values):
+    """
+    Return in one line what of the values belongs to other layouts alone, None without any.
+
+    :param values: ``{full name: value}``, also with names of no layout, such as those that every
+        ROS 2 node has.
+    """
+    settings = DrivelineNodeParameters().changed(DrivelineNodeParameters.part_of(values))
+    counting = rows_of(settings.layout).keys() | settings.named().keys()
+    of_others = all_rows().keys() - counting
+    others = [name for name in values if name in of_others]
+    if not others:
+        return None
+    return (f'{len(others)} parameter{"s" if len(others) > 1 else ""} of another layout than '
+            f'{settings.layout} count{"" if len(others) > 1 else "s"} for nothing: '
+            f'{", ".join(others)}')
+
+
 def make_driveline(values, dt=None):
     """
     Return the ``Driveline`` that a node with the given parameters would run.
@@ -79,6 +97,19 @@ def node_ports(car):
         ports.append(port._replace(array='effort' if by_effort else 'position',
                                    lasts=port.kind not in DEMANDED))
     return tuple(ports)
+
+
+def step_arguments(car):
+    """Return a function of a value for each of ``node_ports``: the arguments of ``car.step``."""
+    wheels, clutches = len(car.wheels), car.clutches
+    first_other = wheels + len(clutches)
+
+    def arguments(held):
+        torque, *others = held
+        steer, grade, *road = others[first_other:]
+        return (torque, others[:wheels], dict(zip(clutches, others[wheels:first_other])), steer,
+                grade, road[:wheels], road[wheels:])
+    return arguments
 
 
 def topics_of(ports):
@@ -122,7 +153,7 @@ class DrivelinePlant(Driven):
         car = make_driveline(values)
         ports = node_ports(car)
         super().__init__(settings, car, ports, topics_of(ports), log)
-        self._wheels, self._clutches = len(car.wheels), len(car.clutches)
+        self._arguments = step_arguments(car)
         self.reset()
         self.adopt(PreparedDriveline(settings, None))
 
@@ -148,13 +179,7 @@ class DrivelinePlant(Driven):
         return {**dict(self.settings.rows().values()), **self.simulation.parameter_rows}
 
     def _step(self, held):
-        wheels, clutches = self._wheels, self._clutches
-        torque, *others = held
-        brakes, others = others[:wheels], others[wheels:]
-        forces, (steer, grade, *road) = others[:clutches], others[clutches:]
-        return self.simulation.step(
-            torque, brakes, dict(zip(self.simulation.clutches, forces)), steer, grade,
-            road[:wheels], road[wheels:])
+        return self.simulation.step(*self._arguments(held))
 
     def _reset_simulation(self):
         self.simulation.reset(self.settings.initial_speed)

@@ -47,7 +47,7 @@ class Differential:
 
     def __init__(self, name, shafts_name, p, dt):
         self.name, self.parameters = name, p
-        mechanism = equipped(
+        mechanism = self.mechanism = equipped(
             SYMMETRIC if isinstance(p, SymmetricParameters) else SELF_LOCKING, p)
         self.ports = mechanism.inputs
         self.shafts = tuple([f'{shafts_name}_{shaft}' for shaft in mechanism.shafts])

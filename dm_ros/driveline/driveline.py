@@ -174,12 +174,32 @@ class Driveline:
                       for port in d.ports[-2:]])
 
     @property
-    def driven_by(self):
-        """``{shaft: connection}`` of those at whose end b a connection is."""
+    def inertias(self):
+        """``{shaft: kg m^2}`` of what is neither a wheel nor in a differential; input first."""
+        return MappingProxyType(self._assembly.inertias)
+
+    @property
+    def mechanisms(self):
+        """``{differential: Differential}``: the mechanism, parameters and shafts of each."""
+        return {differential.name: differential for differential in self._differentials}
+
+    @property
+    def wheel_places(self):
+        """``{wheel: (x, y)}`` of its contact, m before and to the left of the centre of mass."""
+        return {wheel.name: (wheel.x, wheel.y) for wheel in self._assembly.wheels}
+
+    @property
+    def ends(self):
+        """``{connection: (shaft, shaft)}`` at its ends a and b, of which b is at the wheels."""
         places = {(d.name, port): shaft for d in self._differentials
                   for port, shaft in d.shaft_of.items()}
-        return {places.get((c.b.element, c.b.port), c.b.element): c.name
-                for c in self._assembly.connections}
+        return {c.name: tuple([places.get((flange.element, flange.port), flange.element)
+                               for flange in (c.a, c.b)]) for c in self._assembly.connections}
+
+    @property
+    def driven_by(self):
+        """``{shaft: connection}`` of those at whose end b a connection is."""
+        return {b: connection for connection, (_, b) in self.ends.items()}
 
     @property
     def parts(self):

@@ -25,8 +25,13 @@ def replacing(path, mode):
     """
     path = os.fspath(path)
     if path.startswith('/dev/') or os.path.exists(path) and not os.path.isfile(path):
-        with open(path, mode) as file:
-            yield file
+        try:
+            with open(path, mode) as file:
+                yield file
+        except OSError as error:
+            if error.filename is None:   # as of a full disk: of this file, not of one around it
+                raise OSError(error.errno, error.strerror, path) from None
+            raise
         return
     folder, name = os.path.split(os.path.realpath(path))
     unfinished = os.path.join(folder, f'.{name}.{os.getpid()}.part')

@@ -17,7 +17,7 @@ import textwrap
 
 import yaml
 
-from dm_ros.settings import tables
+from dm_ros.settings import known_rows, tables
 
 NODE = '/differential'
 TYPE_NAMES = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
@@ -37,10 +37,12 @@ NOT_FINITE = re.compile(r'[-+]?(?i:inf|infinity|nan)|[-+]?\.(inf|Inf|INF)|\.(nan
 SECTION = re.compile(r'/|/?(\*\*?|\w+)(/(\*\*?|\w+))*', re.ASCII)
 
 
-def read_parameter_file(path, node=NODE):
+def read_parameter_file(path, node=NODE, rows=None):
     """
     Return the parameters that a file gives to a node ``/differential``, or of another full name.
 
+    :param rows: ``{full name: Row}`` of all parameters that such a node may have, each of which
+        is checked alone; None for those of ``/differential``, checked together too.
     :return: ``{full name: value}``, only those in the file.
     :raises ValueError: one line, ``file: name: what``, for a file that cannot be read, an
         unknown name, a value that is not allowed, or values that make an impossible mechanism.
@@ -50,13 +52,14 @@ def read_parameter_file(path, node=NODE):
         for name_of_node, parameters in _sections(_documents(path)):
             if is_for_node(name_of_node, node):
                 values.update(_flat(parameters))
-        for table in tables():
-            mine = table.part_of(values)
-            for name, row in table.rows().values():
-                if name in mine:
-                    _check_type(name, mine[name], row.kind)
-            table().changed(mine)
-        _check_other_names(values)
+        known = known_rows() if rows is None else rows
+        for name, row in known.items():
+            if name in values:
+                _check_type(name, values[name], row.kind)
+                row.checked(name, values[name])
+        for table in tables() if rows is None else ():
+            table().changed(table.part_of(values))
+        _check_other_names(values, known)
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
     return values
@@ -213,8 +216,7 @@ def _check_type(name, value, kind):
                      f'it must be {TYPE_NAMES[kind]}{hint}')
 
 
-def _check_other_names(values):
-    known = {name for table in tables() for name, _ in table.rows().values()}
+def _check_other_names(values, known):
     for name, value in values.items():
         if name not in known and not ROS_PARAMETERS.fullmatch(name):
             raise ValueError(f'{name}: there is no such parameter')

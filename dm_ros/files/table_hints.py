@@ -19,14 +19,15 @@ DIVISORS = {'ms': '1000', 'us': '1e6', 'ns': '1e9'}
 def of_header(names, needed, optional):
     """Return a hint on a header with an unknown column, '' for none."""
     for separator, words in SEPARATORS.items():
-        if any(len({part.strip(' "') for part in name.split(separator)} & set(needed)) > 1
-               for name in names):
+        if any(len({part.strip(' "') for part in name.split(separator)}
+                   & {*needed, *optional}) > 1 for name in names):
             return f'; it has {words}, write commas, and decimal points'
     missing = [name for name in needed if name not in names]
+    absent = [name for name in optional if name not in names]
     unknown = [name for name in names if name not in (*needed, *optional)]
     for name in unknown:
         words = re.findall('[a-z]+', name.lower())
-        for meant in missing:
+        for meant in (*missing, *absent):
             if words[:1] and words[0] in TIMES and not {*words[1:]} - UNITS and meant == 'time':
                 return f'; write time for {name!r}, in s'
             if meant in words and not {*words} - {meant} - KINDS - UNITS:

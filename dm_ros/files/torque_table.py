@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 from dm_ros.files import table_hints
+from dm_ros.mechanism.ports import force
 
 ON_TIME = 1e-3   # ticks; a time this little after the start of a tick counts as that start
 LATEST_BEGIN = 1000.0   # s; a file that begins later, as at an epoch, begins the run
@@ -19,7 +20,8 @@ class TorqueTable(NamedTuple):
     """Times, strictly increasing and none negative, and the torques from each time on."""
 
     times: tuple     # s
-    torques: tuple   # of tuples: N m, in the order of the inputs, and N, in that of the clutches
+    torques: tuple   # of tuples: N m, in the order of the inputs, and N, in that of the clutches;
+    # those of a driveline in the order and the units of its ports
     idle: tuple      # likewise, what holds before the first time
     begin: float = 0.0   # s; what the file calls time 0
 
@@ -97,23 +99,48 @@ def read_torque_file(path, ports, clutches=(), ignored=(), beside=()):
     :param beside: the same, of columns that may well be there.
     :raises ValueError: one line that names file, line and column.
     """
+    return _read(path, ports, [force(name) for name in clutches], False, ignored, beside, {})
+
+
+def read_input_file(path, ports, ignored=(), reasons=()):
+    """
+    Return the ``TorqueTable`` of a CSV file that may have a column for each port, and need not.
+
+    A row has a value for each port, the idle one where there is no column.
+
+    :param ports: the ``Port`` s; cells must be in their ranges.
+    :param ignored: names of further columns, whose cells are not read.
+    :param reasons: ``{port name: words}``, why a range is as it is.
+    :raises ValueError: as ``read_torque_file``.
+    """
+    return _read(path, (), ports, True, ignored, (), dict(reasons))
+
+
+def _read(path, *more):
     try:
         # utf-8-sig: spreadsheets begin the file with a byte order mark
         with open(path, newline='', encoding='utf-8-sig') as file:
-            return _table(path, csv.reader(file, strict=True), ports, clutches, ignored, beside)
+            return _table(path, csv.reader(file, strict=True), *more)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{path}: not a text file in UTF-8') from None
 
 
-def _table(path, reader, ports, clutches, ignored, beside):
-    inputs = [port.name for port in ports]
+def _table(path, reader, needed, optional, is_whole, ignored, beside, reasons):
+    """
+    Return the ``TorqueTable``.
+
+    :param needed, optional: ``Port`` s; is_whole: whether rows have a value for each of the
+        optional ones even if no column is there.
+    """
+    inputs, wanted = ([port.name for port in ports] for ports in (needed, optional))
     try:
         rows = (row for row in reader if any(cell.strip() for cell in row))
-        header = _header(next(rows, ()), inputs, clutches, ignored, beside)
+        header = _header(next(rows, ()), inputs, wanted, ignored, beside)
         ignored = *ignored, *beside
-        forces = clutches if set(clutches) & (set(header) - set(ignored)) else ()
+        if not is_whole and not set(wanted) & (set(header) - set(ignored)):
+            optional = ()
         times, torques, begin = [], [], 0
         for row in rows:
             cells = _cells(header, ignored, row, is_first=not times)
@@ -130,23 +157,24 @@ def _table(path, reader, ports, clutches, ignored, beside):
                     f"column 'time': {time!r}{since} does not come after {times[-1]!r}{since}")
             times.append(time)
             torques.append((*(cells[name] for name in inputs),
-                            *(_force(name, cells.get(name, 0.0)) for name in forces)))
+                            *(_in_range(port, cells, reasons) for port in optional)))
         if not times or times[-1] == 0.0:
             raise ValueError(f"column 'time': a row with a time above {begin} must end the run")
     except (csv.Error, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):
             raise
         raise ValueError(f'{path}:{max(reader.line_num, 1)}: {error}') from None
-    idle = *(port.idle for port in ports), *(0.0 for _ in forces)
+    idle = tuple([port.idle for port in (*needed, *optional)])
     return TorqueTable(tuple(times), tuple(torques), idle, float(begin))
 
 
-def _header(row, inputs, clutches, ignored, beside):
+def _header(row, inputs, wanted, ignored, beside):
     if not row:
         raise ValueError('the file is empty')
     names = [cell.strip() for cell in row]
     needed = ('time', *inputs)
-    known = ', '.join((*needed, *(f'{name} (if wanted)' for name in clutches)))
+    known = (', '.join((*needed, *(f'{name} (if wanted)' for name in wanted))) if inputs else
+             f'time and any of {", ".join(wanted)}')
     for name in ignored:
         if name in needed:
             raise ValueError(f'column {name!r}: it is needed and cannot be ignored')
@@ -155,8 +183,8 @@ def _header(row, inputs, clutches, ignored, beside):
     for index, name in enumerate(names):
         if name in ignored or name in beside:
             continue
-        if name not in (*needed, *clutches):
-            hint = table_hints.of_header(names, needed, (*clutches, *beside))
+        if name not in (*needed, *wanted):
+            hint = table_hints.of_header(names, needed, (*wanted, *beside))
             raise ValueError(f'column {name!r}: unknown, the columns are {known}{hint}')
         if name in names[:index]:
             raise ValueError(f'column {name!r}: it appears twice')
@@ -182,9 +210,14 @@ def _cells(header, ignored, row, is_first):
     return cells
 
 
-def _force(name, value):
-    if value < 0.0:
-        raise ValueError(f'column {name!r}: {value!r} N is negative, a clutch can only be pressed')
+def _in_range(port, cells, reasons):
+    """Return the value of an optional port from the cells of a row, or its idle one."""
+    value = cells.get(port.name, port.idle)
+    if port.kind == 'force' and value < 0.0:
+        raise ValueError(f'column {port.name!r}: {value!r} N is negative, a clutch can only be '
+                         'pressed')
+    if refusal := port.refusal(value):
+        raise ValueError(f'column {port.name!r}: {refusal}{reasons.get(port.name, "")}')
     return value
 
 

@@ -78,12 +78,18 @@ def brief(*values):
     return ' '.join(f'{round(value, 12) + 0.0:.6g}' for value in values)
 
 
+def link_name(prefix, name):
+    """Return the name of the link of a part."""
+    return f'{prefix}{name}_link'
+
+
 class Link:
     """A link under construction; z is the axis that it turns about."""
 
-    def __init__(self, robot, prefix, name):
+    def __init__(self, robot, prefix, name, full_name=None):
+        """:param full_name: what it is called, if not by prefix and name."""
         self._prefix = prefix
-        self._element = SubElement(robot, 'link', name=f'{prefix}{name}_link')
+        self._element = SubElement(robot, 'link', name=full_name or link_name(prefix, name))
 
     def inertial(self, inertia, radius, height, middle=0.0):
         """
@@ -181,14 +187,82 @@ def draw_carrier(link, size, count):
 
 
 def joint(robot, prefix, name, parent, xyz, rpy, leader=None):
-    """Add the continuous joint of a link of the same name, which may follow a leading joint."""
+    """
+    Add the continuous joint of a link of the same name, which may follow a leading joint.
+
+    :param parent: name of the link against which it turns, with all that is before it.
+    """
     element = SubElement(robot, 'joint', name=prefix + name, type='continuous')
-    SubElement(element, 'parent', link=f'{prefix}{parent}_link')
-    SubElement(element, 'child', link=f'{prefix}{name}_link')
+    SubElement(element, 'parent', link=parent)
+    SubElement(element, 'child', link=link_name(prefix, name))
     SubElement(element, 'origin', xyz=exact(*xyz), rpy=exact(*rpy))
     SubElement(element, 'axis', xyz='0 0 1')
     if leader:
         SubElement(element, 'mimic', joint=prefix + leader, multiplier='1', offset='0')
+
+
+def add_materials(robot, prefix, colours):
+    """Add ``{name: (red, green, blue)}``, or with opacity."""
+    for name, colour in colours.items():
+        SubElement(SubElement(robot, 'material', name=prefix + name), 'color',
+                   rgba=brief(*(*colour, 1.0)[:4]))
+
+
+def add_differential(robot, mechanism, p, prefix, parent, before='', place=(0.0, 0.0, 0.0), way=1):
+    """
+    Add the links and joints of a differential.
+
+    :param mechanism: its ``Mechanism``; p: its table of parameters.
+    :param prefix: before all names; before: further, before those of its links and joints.
+    :param parent: name of the link against which it turns; place: of its middle there, m.
+    :param way: +1 where its pinion is in front of it, -1 behind.
+    :return: ``{shaft: (Link, its place, rpy of its axis)}`` of those that can be driven.
+    :raises ValueError: where the parameters are too extreme to be drawn.
+    """
+    x, y, z = place
+    size = sizes(mechanism, p)
+    size = size._replace(side=way * size.side)
+    inertia = {shaft: p.named()[f'{p.prefix}.inertia.{shaft}'] for shaft in mechanism.shafts}
+    carrier = Link(robot, prefix, f'{before}carrier')
+    carrier.inertial(inertia['carrier'], size.ring if size.pinion else size.case, size.width)
+    draw_carrier(carrier, size, p.n_s)
+    along = ALONG[mechanism.outputs[0]]
+    joint(robot, prefix, f'{before}carrier', parent, place, along)
+    made = {f'{before}carrier': (carrier, place, along)}
+    for k, (shaft, colour, radius) in enumerate(zip(
+            mechanism.outputs, ('first', 'second'), (p.R_F1, p.R_F2))):
+        link = Link(robot, prefix, before + shaft)
+        link.inertial(inertia[shaft], size.crowns[k] + size.width / 2, size.width,
+                      (1 - 2 * k) * (size.satellite + size.width / 2))
+        draw_shaft(link, size, k, colour, radius)
+        joint(robot, prefix, before + shaft, parent, place, along)
+        made[before + shaft] = link, place, along
+    if size.pinion:
+        end = 0.9 * size.ring
+        link = Link(robot, prefix, f'{before}pinion')
+        link.inertial(inertia['pinion'], size.pinion, size.width)
+        link.gear('pinion', size.pinion, -size.width / 2, size.width / 2)
+        link.disc('pinion', 0.5 * size.pinion, 0.0, way * end)
+        link.gear('pinion', 0.8 * size.pinion, way * end, way * (end + size.width / 2))
+        made[f'{before}pinion'] = link, (x + way * size.ring, y, z), FORWARD
+        joint(robot, prefix, f'{before}pinion', parent, *made[f'{before}pinion'][1:])
+    middle = sum(size.crowns) / 2
+    half = (max(size.crowns) - min(size.crowns) + size.width) / 2
+    for n in range(p.n_s):
+        name, angle = f'{before}satellite{f"_{n + 1}" * (n > 0)}', 2 * pi * n / p.n_s
+        link = Link(robot, prefix, name)
+        link.inertial(inertia['satellite'], size.satellite, 2 * half)
+        link.gear('satellite', size.satellite, -half, half)
+        joint(robot, prefix, name, link_name(prefix, f'{before}carrier'),
+              (middle * cos(angle), middle * sin(angle), 0.0), (0.0, pi / 2, angle),
+              f'{before}satellite' if n else None)
+    return made
+
+
+def as_text(robot):
+    """Return a URDF as text."""
+    ElementTree.indent(robot)
+    return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n'
 
 
 def urdf(mechanism, parameters, prefix='', node=None, lockstep=False):
@@ -206,46 +280,15 @@ def urdf(mechanism, parameters, prefix='', node=None, lockstep=False):
         clutches: they are left out.
     :raises ValueError: where the parameters are too extreme to be drawn.
     """
-    p, size = parameters, sizes(mechanism, parameters)
-    inertia = {shaft: p.named()[f'{p.prefix}.inertia.{shaft}'] for shaft in mechanism.shafts}
     robot = Element('robot', name=f'{prefix}differential')
-    for name, colour in COLOURS.items():
-        SubElement(SubElement(robot, 'material', name=prefix + name), 'color',
-                   rgba=brief(*colour, 1.0))
+    add_materials(robot, prefix, COLOURS)
     Link(robot, prefix, 'housing')
-    carrier = Link(robot, prefix, 'carrier')
-    carrier.inertial(inertia['carrier'], size.ring if size.pinion else size.case, size.width)
-    draw_carrier(carrier, size, p.n_s)
-    along = ALONG[mechanism.outputs[0]]
-    joint(robot, prefix, 'carrier', 'housing', (0.0, 0.0, 0.0), along)
-    for k, (shaft, colour, radius) in enumerate(zip(
-            mechanism.outputs, ('first', 'second'), (p.R_F1, p.R_F2))):
-        link = Link(robot, prefix, shaft)
-        link.inertial(inertia[shaft], size.crowns[k] + size.width / 2, size.width,
-                      (1 - 2 * k) * (size.satellite + size.width / 2))
-        draw_shaft(link, size, k, colour, radius)
-        joint(robot, prefix, shaft, 'housing', (0.0, 0.0, 0.0), along)
-    if size.pinion:
-        link = Link(robot, prefix, 'pinion')
-        link.inertial(inertia['pinion'], size.pinion, size.width)
-        link.gear('pinion', size.pinion, -size.width / 2, size.width / 2)
-        link.disc('pinion', 0.5 * size.pinion, 0.0, 0.9 * size.ring)
-        link.gear('pinion', 0.8 * size.pinion, 0.9 * size.ring, 0.9 * size.ring + size.width / 2)
-        joint(robot, prefix, 'pinion', 'housing', (size.ring, 0.0, 0.0), FORWARD)
-    middle = sum(size.crowns) / 2
-    half = (max(size.crowns) - min(size.crowns) + size.width) / 2
-    for n in range(p.n_s):
-        name, angle = 'satellite' if n == 0 else f'satellite_{n + 1}', 2 * pi * n / p.n_s
-        link = Link(robot, prefix, name)
-        link.inertial(inertia['satellite'], size.satellite, 2 * half)
-        link.gear('satellite', size.satellite, -half, half)
-        joint(robot, prefix, name, 'carrier', (middle * cos(angle), middle * sin(angle), 0.0),
-              (0.0, pi / 2, angle), 'satellite' if n else None)
+    add_differential(robot, mechanism, parameters, prefix, link_name(prefix, 'housing'))
     if node:
         clutches = () if lockstep else mechanism.clutch_moments
         for clutch in clutches:
             Link(robot, prefix, clutch)
-            joint(robot, prefix, clutch, 'carrier', (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            joint(robot, prefix, clutch, link_name(prefix, 'carrier'), (0.0, 0.0, 0.0),
+                  (0.0, 0.0, 0.0))
         add_ros2_control(robot, mechanism, prefix, node, bool(clutches))
-    ElementTree.indent(robot)
-    return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n'
+    return as_text(robot)

@@ -5,7 +5,7 @@
 
 import sys
 
-from dm_ros.driveline_plant import all_rows, DrivelinePlant
+from dm_ros.driveline_plant import all_rows, DrivelinePlant, passed_over
 from dm_ros.ros.driveline_messages import DrivelineMessages
 from dm_ros.ros.driven_node import DrivenNode, main_of
 from dm_ros.ros.parameters import declare_rows
@@ -62,11 +62,8 @@ class DrivelineNode(DrivenNode):
         started = {name: known[name].strictly_checked(name, value)
                    for name, value in given.items() if name in known}
         plant = DrivelinePlant(started, self.get_logger())
-        if others := [name for name in started if name not in plant.rows]:
-            self.get_logger().warning(
-                f'{len(others)} parameter{"s" if len(others) > 1 else ""} of another layout than '
-                f'{plant.settings.layout} count{"" if len(others) > 1 else "s"} for nothing: '
-                f'{", ".join(others)}')
+        if others := passed_over(started):
+            self.get_logger().warning(others)
         declare_rows(self, plant.rows, plant.values)
         return plant
 

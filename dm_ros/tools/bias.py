@@ -7,11 +7,13 @@ import argparse
 import math
 import sys
 
+from dm_ros.driveline_plant import make_driveline
 from dm_ros.ending import run_command
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.mechanism.bias import forces_for, torque_bias
 from dm_ros.mechanism.power_flow import DIRECT
 from dm_ros.mechanism.variants import MECHANISMS, SELF_LOCKING, variant_named
+from dm_ros.tools.driveline_option import add_driveline, driveline_values, refuse, SEVERAL
 from dm_ros.tools.passed_over import warn
 
 DESCRIPTION = """\
@@ -32,19 +34,34 @@ ratio, less what pinion bearing and final drive lose.
 
 The mechanism is that of the variant in FILE, or the only one with parameters in FILE, or else the
 self-locking one. The limits of the actuators are those of FILE.
+
+With --driveline it tells of each differential of a car, with its own parameters, by the torque on
+its carrier.
 """
 
 
-def sentence(p, torque, direction=DIRECT, forces=(0.0, 0.0)):
+def sentence(p, torque, direction=DIRECT, forces=(0.0, 0.0), what='this parameter set'):
     """Return one line on the limits at a carrier torque in N m, or at a large one, infinite."""
     limits = torque_bias(p, torque, direction, forces)
     one, other = p.shafts
     first, second = (_range(side) for side in zip(*(split.share for split in limits)))
     if direction == DIRECT:
-        return (f'this parameter set can send {first} of {_in_words(torque)} to the {one} '
+        return (f'{what} can send {first} of {_in_words(torque)} to the {one} '
                 f'and {second} to the {other}')
-    return (f'this parameter set can take {first} of {_in_words(torque)} that brakes the carrier '
+    return (f'{what} can take {first} of {_in_words(torque)} that brakes the carrier '
             f'from the {one} and {second} from the {other}')
+
+
+def sentence_without_friction(p, direction, what):
+    """Return one line on the one split that a differential without friction has."""
+    split, _ = torque_bias(p, direction=direction)
+    (one, other), (first, second) = p.shafts, (f'{100 * share:.1f} %' for share in split.share)
+    why = 'its clutches have no friction' if p.has_clutches else 'it has no clutches'
+    if direction == DIRECT:
+        return (f'{what} sends {first} of any torque to the {one} and {second} to the {other}: '
+                f'{why}')
+    return (f'{what} takes {first} of any torque that brakes the carrier from the {one} and '
+            f'{second} from the {other}: {why}')
 
 
 def answer(p, side, percent, torque, direction=DIRECT):
@@ -91,6 +108,7 @@ def parser():
         'bias', description=DESCRIPTION, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
+    add_driveline(result, planar=False)
     result.add_argument('--mechanism', choices=MECHANISMS,
                         help='which differential; default: that of FILE, see below')
     result.add_argument('--torque', type=float, default=300.0, metavar='N',
@@ -114,16 +132,38 @@ def mechanism_of(values, otherwise=SELF_LOCKING):
     return found[0] if len(found) == 1 else otherwise
 
 
+def run_driveline(arguments):
+    """Print the limits of each differential of a car; raise ValueError where they are none."""
+    refuse(arguments, {'--mechanism': SEVERAL, '--share-to': SEVERAL})
+    if any(arguments.forces):
+        raise ValueError(f'--forces: {SEVERAL}')
+    car = make_driveline(driveline_values('bias', arguments))
+    direction = -DIRECT if arguments.reverse else DIRECT
+    for name, differential in car.mechanisms.items():
+        p, what = differential.parameters, f'the {name} differential'
+        if not any(p.f):
+            print(sentence_without_friction(p, direction, what))
+            continue
+        for torque in (arguments.torque, math.inf):
+            try:
+                print(sentence(p, torque, direction, what=what))
+            except ValueError as error:
+                raise ValueError(f'{what}: {error}') from None
+
+
 def run(arguments):
     """Do what the command line says; raise ValueError or OSError where it cannot be done."""
+    if not 0.0 < arguments.torque < math.inf:
+        raise ValueError(f'--torque: {arguments.torque!r} is not allowed, '
+                         'it must be a number of N m above 0')
+    if arguments.driveline is not None:
+        run_driveline(arguments)
+        return
     values = read_parameter_file(arguments.params) if arguments.params else {}
     mechanism = (MECHANISMS[arguments.mechanism] if arguments.mechanism
                  else mechanism_of(values))
     warn('bias', arguments.params, values, mechanism)
     p = mechanism.parameters().changed(mechanism.parameters.part_of(values))
-    if not 0.0 < arguments.torque < math.inf:
-        raise ValueError(f'--torque: {arguments.torque!r} is not allowed, '
-                         'it must be a number of N m above 0')
     for force in arguments.forces:
         if not 0.0 <= force < math.inf:
             raise ValueError(f'--forces: {force!r} is not allowed, it must be a number of N, '

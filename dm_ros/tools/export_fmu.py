@@ -29,7 +29,8 @@ FMU has its sources alone. Binaries for other platforms come from the package zi
 doc/fmu.md tells how it gets into Simulink, CarMaker, OMSimulator and fmi_adapter.
 
 Of FILE, a ROS 2 parameter file, these count: variant, the parameters of the mechanism, loss_law,
-rate, substeps, power_flow_deadband, initial_velocity. Ports must take torques.
+rate, substeps, power_flow_deadband, initial_velocity. Ports must take torques. A driveline, as
+simulate --driveline runs it, cannot be exported.
 """
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Simulate a differential without ROS, faster than real time: torques from CSV, results to CSV."""
+"""Simulate a differential, or a car, without ROS: torques from CSV, results to CSV."""
 
 import argparse
 from array import array
@@ -10,23 +10,16 @@ from contextlib import ExitStack
 import os
 import sys
 
-import numpy as np
-
 from dm_ros.ending import run_command
-from dm_ros.files.bag import TickBag
-from dm_ros.files.columns import as_row, column_names, write_csv
+from dm_ros.files.columns import write_csv
 from dm_ros.files.output import replacing
-from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.plot import require_matplotlib
-from dm_ros.files.record import Record
-from dm_ros.files.recorded_drive import is_bag, read_drive
-from dm_ros.files.torque_table import read_torque_file
 from dm_ros.mechanism.variants import VARIANTS
 from dm_ros.motion.models import LOSS_LAWS
-from dm_ros.motion.simulation import NO_FORCE
-from dm_ros.settings import make_simulation, NodeParameters
-from dm_ros.tools.passed_over import warn
+from dm_ros.settings import NodeParameters
+from dm_ros.tools.driveline_option import add_driveline
 from dm_ros.tools.progress import progress
+from dm_ros.tools.simulated import DifferentialRun, DrivelineRun
 from dm_ros.tools.tables import add_ignore_columns, remarks, unit_hint
 
 MANY_TICKS, MOST_TICKS = 10**6, 10**7   # beyond: their number is told before, needs --yes
@@ -59,6 +52,19 @@ it is told how far the speeds are from those of the recording.
 Of FILE, a ROS 2 parameter file, these count: variant, the parameters of the mechanism, loss_law,
 rate, substeps, power_flow_deadband, initial_velocity, ports, and for bags joint_prefix and
 torque_timeout.
+
+With --driveline it is a whole car, as the node driveline runs it; doc/driveline.md tells of it.
+The columns of IN.csv are then time and any of: input (N m, torque of the gearbox), <wheel>_brake
+(N m it can hold), <clutch>_clutch (N), steer (rad), grade (tangent of the slope), <wheel>_grip,
+<wheel>_contact (1). A column that is left out has its idle value: 1 for grip and contact, 0 for
+all others; so it is before the first row. The wheels are front_left, front_right, rear_left and
+rear_right; the clutches of awd centre_front and centre_rear, and those of axles with friction
+surfaces. OUT.csv has time, velocity, position (of shafts), torque, twist (of connections), moment,
+power_flow (of differentials), longitudinal_slip, lateral_slip, longitudinal_force, lateral_force,
+load (of wheels), clutch_force, and x, y, yaw, longitudinal_speed, lateral_speed, yaw_rate,
+longitudinal_acceleration, lateral_acceleration of the body. Of FILE, for a node /driveline, these
+count: layout, planar, driveline.*, rate, initial_speed. There are no bags of a driveline, and no
+FMUs (export_fmu) and ensembles (Ensemble, sweep) of it either.
 """
 
 
@@ -68,6 +74,9 @@ def parser():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     result.add_argument('--variant', choices=VARIANTS,
                         help='the mechanism and its formulation; default: variant of FILE')
+    add_driveline(result)
+    result.add_argument('--initial-speed', type=float, metavar='V', help='of the car at the '
+                        'start, m/s; default: initial_speed of FILE, else 0')
     result.add_argument('--loss-law', choices=LOSS_LAWS,
                         help='what gears and bearings lose; default: loss_law of FILE, '
                         f'else {NodeParameters().loss_law}')
@@ -102,9 +111,9 @@ def size(count):
     return f'{count / 10**power:.3g} {name}'
 
 
-def announced(arguments, table, simulation, torques):
+def announced(arguments, what, inputs):
     """Tell what a user may not know before a run; raise ValueError where ``--yes`` is needed."""
-    ticks, columns = len(torques), len(column_names(simulation))
+    ticks, columns, table, dt = len(inputs), len(what.columns), what.table, what.simulation.dt
     sizes = []
     if written_as_csv(arguments):
         sizes.append(f'{size(ticks * columns * CELL)} of CSV')
@@ -112,12 +121,11 @@ def announced(arguments, table, simulation, torques):
         sizes.append(f'{size(ticks * (columns * NUMBER + MESSAGES))} of a bag')
     if arguments.plot:
         sizes.append(f'{size(ticks * columns * NUMBER)} of memory')
-    needs = f'{ticks} ticks of {simulation.dt:.6g} s, about {" and ".join(sizes)}'
+    needs = f'{ticks} ticks of {dt:.6g} s, about {" and ".join(sizes)}'
     if ticks > MOST_TICKS and not arguments.yes:
         raise ValueError(f'{arguments.torques}: time: {needs}, run only with --yes'
                          f'{unit_hint(table)}')
-    for line in remarks(arguments.torques, table, simulation.dt,
-                        lambda dt: f'--dt {dt!r} (or --dt auto)'):
+    for line in remarks(arguments.torques, table, dt, lambda dt: f'--dt {dt!r} (or --dt auto)'):
         print('simulate:', line, file=sys.stderr)
     if ticks > MANY_TICKS:
         print('simulate:', needs, file=sys.stderr, flush=True)
@@ -128,78 +136,11 @@ def written_as_csv(arguments):
     return arguments.out or not (arguments.plot or arguments.bag)
 
 
-class Comparison:
-    """How far a run is from the one that was recorded."""
-
-    def __init__(self, speeds):
-        """:param speeds: those of a ``RecordedDrive``."""
-        self._speeds, self._largest = speeds, (0.0, 0.0)   # rad/s, and when, s
-
-    def __str__(self):
-        if self._largest[0] == 0.0:
-            return 'all speeds are those of the recording, bit by bit'
-        return 'speeds are up to {:.3g} rad/s from those of the recording, at {:.6g} s'.format(
-            *self._largest)
-
-    def note(self, tick, snapshot):
-        """Take the end of a tick."""
-        recorded = self._speeds.get(tick, snapshot.velocity)
-        if recorded != snapshot.velocity:
-            away = max(abs(a - b) for a, b in zip(recorded, snapshot.velocity))
-            self._largest = max(self._largest, (away, snapshot.time))
-
-
-def rows_of(simulation, torques, bag=None, comparison=None):
-    """Run a simulation; yield the start and the end of each tick as rows of a record."""
-    snapshot = simulation.snapshot()
-    if bag:
-        bag.start(snapshot)
-    yield as_row(snapshot)
-    count = len(simulation.inputs)
-    for row in progress(torques, total=len(torques)):
-        snapshot = simulation.step(row[:count], row[count:] or NO_FORCE)
-        if bag:
-            bag.tick(row, snapshot)
-        if comparison:
-            comparison.note(simulation.ticks, snapshot)
-        yield as_row(snapshot)
-
-
 def kept(rows, numbers):
     """Yield rows and keep their numbers in an array."""
     for row in rows:
         numbers.extend(row)
         yield row
-
-
-def loaded(arguments, variant, values):
-    """Return a simulation, its ``TorqueTable``, and its ``Comparison`` or None."""
-    is_auto = arguments.dt == 'auto'
-    simulation = make_simulation(variant, values, None if is_auto else arguments.dt)
-    mechanism = simulation.mechanism
-    warn('simulate', arguments.params, values, mechanism)
-    if is_bag(arguments.torques):
-        if arguments.ignore_columns:
-            raise ValueError('--ignore-columns: a bag has no columns')
-        timeout = NodeParameters().changed(NodeParameters.part_of(values)).torque_timeout
-        drive = read_drive(arguments.torques, mechanism, 1 / simulation.dt, arguments.node,
-                           timeout)
-        for line in drive.remarks:
-            print(f'simulate: {arguments.torques}: {line}', file=sys.stderr)
-        dt = drive.dt if is_auto or arguments.dt is None else arguments.dt
-        return (make_simulation(variant, values | drive.values, dt), drive.table,
-                Comparison(drive.speeds) if drive.speeds and dt == drive.dt else None)
-    if arguments.node:
-        raise ValueError('--node: only a bag has nodes')
-    table = read_torque_file(arguments.torques, mechanism.ports, mechanism.clutch_moments,
-                             arguments.ignore_columns)
-    if is_auto:
-        try:
-            dt = table.tick_for_all(simulation.dt)
-        except ValueError as error:
-            raise ValueError(f'{arguments.torques}: {error}') from None
-        simulation = make_simulation(variant, values, dt)
-    return simulation, table, None
 
 
 def run(arguments):
@@ -210,24 +151,17 @@ def run(arguments):
         arguments.torques, arguments.params, arguments.out, arguments.plot, arguments.bag) if path]
     if len(set(files)) < len(files):
         raise ValueError(f'{max(files, key=files.count)}: given for two files')
-    values = read_parameter_file(arguments.params) if arguments.params else {}
-    if arguments.loss_law:
-        values['loss_law'] = arguments.loss_law
-    variant = arguments.variant or values.get('variant')
-    if variant is None:
-        raise ValueError('--variant: it is needed where no FILE has the parameter variant')
-    simulation, table, comparison = loaded(arguments, variant, values)
+    what = (DifferentialRun if arguments.driveline is None else DrivelineRun)(arguments)
+    simulation = what.simulation
     try:
-        torques = table.held(simulation.dt)
+        inputs = what.table.held(simulation.dt)
     except ValueError as error:
         raise ValueError(f'{arguments.torques}: {error}') from None
-    announced(arguments, table, simulation, torques)
+    announced(arguments, what, inputs)
     with ExitStack() as stack:
-        bag = arguments.bag and stack.enter_context(TickBag(
-            arguments.bag, simulation.mechanism, 1 / simulation.dt,
-            NodeParameters().changed(NodeParameters.part_of(values)).joint_prefix))
-        file, rows, numbers = None, rows_of(
-            simulation, torques, bag, comparison), array('d')
+        bag = arguments.bag and stack.enter_context(what.bag(arguments.bag))
+        file, numbers = None, array('d')
+        rows = what.rows(progress(inputs, total=len(inputs)), bag)
         if arguments.plot:
             picture = stack.enter_context(replacing(arguments.plot, 'wb'))
             rows = kept(rows, numbers)
@@ -238,19 +172,18 @@ def run(arguments):
             file = stack.enter_context(open(1, 'w', closefd=False))
         try:
             if file:
-                write_csv(file, column_names(simulation), rows)
+                write_csv(file, what.columns, rows)
             else:
                 deque(rows, 0)
         except ValueError as error:
             raise ValueError(f'{arguments.torques}: after {simulation.time:g} s: '
                              f'{error}') from None
         if arguments.plot:
-            Record(simulation, np.frombuffer(numbers), variant).draw(picture)
-    speeds = zip(simulation.shafts, simulation.snapshot().velocity, strict=True)
-    print(f'simulate: {len(torques)} ticks, {simulation.time:.6g} s, final speeds in rad/s:',
-          ', '.join(f'{shaft} {speed:.6g}' for shaft, speed in speeds), file=sys.stderr)
-    if comparison:
-        print('simulate:', comparison, file=sys.stderr)
+            what.draw(numbers, picture)
+    first, *others = what.told
+    print(f'simulate: {len(inputs)} ticks, {simulation.time:.6g} s, {first}', file=sys.stderr)
+    for line in others:
+        print('simulate:', line, file=sys.stderr)
 
 
 def main(args=None):

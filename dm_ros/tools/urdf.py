@@ -1,19 +1,28 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Print a URDF of a differential, made from its parameters, for robot_state_publisher."""
+"""Print a URDF of a differential or a car, from its parameters, for robot_state_publisher."""
 
 import argparse
 import re
 import sys
 
+from dm_ros.driveline_plant import DrivelineNodeParameters, make_driveline
 from dm_ros.ending import run_command
+from dm_ros.files.driveline_urdf import driveline_urdf
 from dm_ros.files.output import replacing
 from dm_ros.files.parameter_file import read_parameter_file
 from dm_ros.files.urdf import urdf
 from dm_ros.mechanism.variants import equipped, variant_named, VARIANTS
 from dm_ros.settings import NodeParameters, port_parameters, speed_ports
 from dm_ros.tools.bias import mechanism_of
+from dm_ros.tools.driveline_option import (
+    add_driveline,
+    driveline_values,
+    NOT_A_DRIVELINE,
+    refuse,
+    SEVERAL,
+)
 from dm_ros.tools.passed_over import warn
 
 EPILOG = """\
@@ -26,6 +35,10 @@ doc/ros2_control.md tells; kinds of ports, and mode, are then those of FILE.
 
 The mechanism is that of the variant, or else the only one with parameters in FILE, or that of the
 default variant of the node.
+
+With --driveline it is the whole car, whose joints are those in ~/joint_states of the node
+driveline; its root is base_frame_id of FILE, else base_link, on the ground below the centre of
+mass. It has a box for the body, which has no mass in it, and front wheels that are not steered.
 """
 
 
@@ -35,6 +48,7 @@ def parser():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     result.add_argument('--variant', choices=VARIANTS,
                         help='the mechanism and its formulation; default: variant of FILE')
+    add_driveline(result)
     result.add_argument('--params', metavar='FILE', help='a ROS 2 parameter file')
     result.add_argument('--joint-prefix', '--prefix', metavar='PREFIX',
                         help='before all names; default: joint_prefix of FILE')
@@ -66,8 +80,9 @@ def described(values):
     return node, equipped(mechanism, p, speed_ports(port_parameters(mechanism.inputs, values))), p
 
 
-def run(arguments):
-    """Do what the command line says; raise ValueError or OSError where it cannot be done."""
+def text_of(arguments):
+    """Return the URDF of a differential; raise ValueError where it cannot be made."""
+    refuse(arguments, {'--planar': NOT_A_DRIVELINE})
     values = read_parameter_file(arguments.params) if arguments.params else {}
     if arguments.variant:
         values['variant'] = arguments.variant
@@ -77,7 +92,21 @@ def run(arguments):
     warn('urdf', arguments.params, values, mechanism)
     controlled = (None if arguments.ros2_control is None
                   else node_name(arguments.ros2_control, '--ros2-control'))
-    text = urdf(mechanism, p, node.joint_prefix, controlled, node.mode == 'lockstep')
+    return urdf(mechanism, p, node.joint_prefix, controlled, node.mode == 'lockstep')
+
+
+def text_of_driveline(arguments):
+    """Return the URDF of a car; raise ValueError where it cannot be made."""
+    refuse(arguments, {'--variant': SEVERAL,
+                       '--ros2-control': 'it drives the node differential alone'})
+    values = driveline_values('urdf', arguments, joint_prefix=arguments.joint_prefix)
+    node = DrivelineNodeParameters().changed(DrivelineNodeParameters.part_of(values))
+    return driveline_urdf(make_driveline(values), node.joint_prefix, node.base_frame_id)
+
+
+def run(arguments):
+    """Do what the command line says; raise ValueError or OSError where it cannot be done."""
+    text = (text_of if arguments.driveline is None else text_of_driveline)(arguments)
     if arguments.out:
         with replacing(arguments.out, 'w') as file:
             file.write(text)
