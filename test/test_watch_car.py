@@ -194,7 +194,8 @@ def test_what_can_be_commanded_has_its_range_and_what_stands_for_zero():
         *[f'{wheel}_{what}' for what in ('grip', 'contact') for wheel in WHEELS]]
     for port in ports.values():
         assert isfinite(port['low']) and isfinite(port['high'])   # what JSON has
-        assert port['low'] <= port['from'] <= port['zero'] <= port['to'] <= port['high']
+        assert port['low'] <= port['zero'] <= port['to'] <= port['high']
+        assert port['from'] == (-port['to'] if port['low'] < 0.0 else 0.0)
     assert {name for name, port in ports.items() if port['zero']} == {
         f'{wheel}_{what}' for what in ('grip', 'contact') for wheel in WHEELS}
     assert 'steer' not in {port['name'] for port in Car(planar=False).scene.ports}

@@ -22,7 +22,6 @@ FLANGES = {
 REACH = {'torque': 600.0, 'capacity': 2000.0, 'force': 5000.0, 'angle': 0.5, 'tangent': 0.3,
          'share': 1.2}     # of a slider, in the unit of its port
 MOST_SHARE = 10.0          # that is taken of a grip or a contact
-LEAST_SHARE = 0.01         # where the slider of a grip begins, which is never 0
 
 
 def control_ports(ports, limits):
@@ -33,8 +32,7 @@ def control_ports(ports, limits):
         low, reach = max(port.low, -high), min(high, REACH[port.kind])
         result.append({
             'name': port.name, 'kind': port.kind, 'unit': port.unit, 'low': low, 'high': high,
-            'zero': port.idle, 'from': -reach if low < 0.0 else LEAST_SHARE if low else 0.0,
-            'to': reach})
+            'zero': port.idle, 'from': -reach if low < 0.0 else 0.0, 'to': reach})
     return [port for port in result if port['high'] > port['low']]   # nothing steers a fixed body
 
 
