@@ -18,7 +18,7 @@ import time
 
 import rclpy
 from sensor_msgs.msg import JointState
-from watch_picture import browser, command
+from watch_picture import browser, CALM, command
 
 from dm_ros.driveline_plant import make_driveline, node_ports
 from dm_ros.files.published import CommandMessage
@@ -26,19 +26,22 @@ from dm_ros.ros.domain import own_domain
 
 SECONDS = 31.0   # until the strips are full
 PERIOD = 0.02    # s from one command to the next
+LATE = 60.0      # s more to wait for such a moment
 WAIT = 15.0      # s for the page to show the car
 DRY, ICE = 0.9, 0.12   # grip below one front wheel, in turns
 
 
 def demand(t):
     """Return {port: value} at a time, s: a slalom, pulled and pushed, on ice now and then."""
+    phase = t % 9.0
+    ice = min(max(min(phase - 2.0, 9.0 - phase), 0.0), 0.5) / 0.5
     return {'input': 90.0 + 320.0 * math.sin(0.55 * t + 3.0),
             'steer': 0.055 * math.sin(0.8 * t + 1.4),
-            'front_left_grip': DRY + (ICE - DRY) * min(max(t % 9.0 - 2.0, 0.0), 0.5) / 0.5}
+            'front_left_grip': DRY + (ICE - DRY) * ice}
 
 
 def drive(driver, arguments):
-    """Command the car until the strips are full, then take the picture."""
+    """Command the car until the strips are full and it pulls on ice, then take the picture."""
     ports = [port for port in node_ports(make_driveline({'layout': arguments.layout,
                                                          'planar': True}))
              if port.name in demand(0.0)]
@@ -46,8 +49,12 @@ def drive(driver, arguments):
     node = rclpy.create_node('driver')
     publisher = node.create_publisher(JointState, '/driveline/commands', 10)
     begin = time.monotonic()
-    while (t := time.monotonic() - begin) < arguments.seconds:
+    while (t := time.monotonic() - begin) < arguments.seconds + LATE:
         values = demand(t)
+        calm = driver.execute_script(CALM)   # no warning, as a busy machine gives
+        if (t > arguments.seconds and calm and values['front_left_grip'] == ICE
+                and values['input'] > 250.0):
+            break
         position, velocity, effort = commands.arrays([values[port.name] for port in ports])
         publisher.publish(JointState(name=commands.names, position=position, velocity=velocity,
                                      effort=effort))

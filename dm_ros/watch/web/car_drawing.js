@@ -19,7 +19,8 @@ const TYRE = 0.23;              // m, its width
 const TREADS = 0.16;            // m from bar to bar
 const HALF = 0.75;              // m, which a quarter of the weight is as a force
 const TOP = 66, BOTTOM = 34;    // px above and below the car
-const BESIDE = 128;             // px that labels need on either side
+const BESIDE = 131;             // px that labels need on either side
+const SMALL = 55;               // px of a metre, below which numbers have no room in the car
 const CASE = 0.14;              // m, radius of a differential
 const BETWEEN = 28;             // px from one arrow of power to the next
 const FAINT = 0.01;             // share of the most below which no power is drawn
@@ -104,9 +105,9 @@ export class CarDrawing {
     this.canvas.width = width * dense;
     this.canvas.height = height * dense;
     [this.width, this.height, this.dense] = [width, height, dense];
-    this.size = Math.min((height - TOP - BOTTOM) / (front + rear + NOSE + TAIL),
-      (width - 2 * BESIDE) / (track + HALF));   // px of a metre
-    this.middle = [width / 2, TOP + (front + NOSE) * this.size];
+    const long = front + rear + NOSE + TAIL, room = height - TOP - BOTTOM;
+    this.size = Math.min(room / long, (width - 2 * BESIDE) / (track + TYRE));   // px of a metre
+    this.middle = [width / 2, TOP + (room - long * this.size) / 2 + (front + NOSE) * this.size];
     this.onResize();
     this.changed = true;
   }
@@ -151,7 +152,7 @@ export class CarDrawing {
     if (!this.now) return;
     this.scene.places.forEach((_, i) => this.#circle(i));
     this.scene.places.forEach((_, i) => this.#force(i));
-    for (const way of this.ways) this.#watts(way);
+    if (this.size > SMALL) for (const way of this.ways) this.#watts(way);
     if (this.scene.planar) this.#compass();
   }
 
