@@ -492,6 +492,17 @@ return [0, 2].map(wheel => {
 """
 
 
+def test_the_page_tells_how_to_start_a_driveline_that_it_waits_for(ros, screen, drive):
+    it = screen('--node', 'driveline')
+    ros.until(lambda: 'ros2 run dm_ros driveline' in it.text('#waiting'))
+    name, effort = re.search(r'name: \[(\w+)\], effort: \[(.+?)\]', it.text('#waiting')).groups()
+    node = drive()
+    ros.publisher(JointState, '/driveline/commands').publish(
+        JointState(name=[name], effort=[float(effort)]))
+    ros.until(lambda: node.plant.inputs.received)
+    assert not node.plant.inputs.refused
+
+
 def test_a_car_goes_by_turns_its_wheels_and_stands_while_paused(ros, screen, drive):
     node = drive(planar=True, initial_speed=15.0)
     it = screen('--node', 'driveline')
