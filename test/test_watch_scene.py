@@ -40,6 +40,9 @@ def test_a_tick_has_a_number_for_each_line_of_the_strips(variant):
     arrays = published.arrays(snapshot)
     assert it.names == published.names
     moment, *force, flow = [effort or position for position, _, effort in arrays[1:]]
+    parts = arrays[0], (moment,), *[array for array in arrays[2:-1]], (flow,)
+    assert it.row(parts) == it.columns(arrays[0].velocity, arrays[0].effort, moment,
+                                       *(force or [()]), flow)
     columns = dict(zip(
         [(strip['name'], series) for strip in it.description['strips']
          for series in strip['series']],

@@ -40,11 +40,15 @@ class Commander:
         :param asked: ``Asked`` of the node that sends.
         """
         self._node, self._live, self._commands, self._asked = node, live, commands, asked
-        self._publisher = node.create_publisher(JointState, f'{name}/torques', QOS)
+        self._name, self._grouped = name, 'torques'   # until there is a node of another kind
+        self._publisher = self._made_publisher()
         self._clients = {word: node.create_client(kind, f'{name}/{service}')
                          for word, (kind, service, _) in SERVICES.items()}
         self._requests = Queue()   # (word, count, Future, deadline)
         self._sent = {}   # the last commands that went out
+
+    def _made_publisher(self):
+        return self._node.create_publisher(JointState, f'{self._name}/{self._grouped}', QOS)
 
     def command(self, viewer, request):
         """Do what a viewer asks for; return the answer to it, or raise ``Refused``."""
@@ -87,13 +91,17 @@ class Commander:
         for _ in range(self._requests.qsize()):
             self._serve(*self._requests.get_nowait())
         scene = self._live.scene
+        if scene and scene.grouped != self._grouped:
+            self._node.destroy_publisher(self._publisher)
+            self._grouped, self._sent = scene.grouped, {}
+            self._publisher = self._made_publisher()
         if not scene:
             self._sent = {}
         elif scene.node.mode == 'realtime':
             values = self._commands.values
             if dropped := self._sent.keys() - values.keys():
                 self._publish({port.name: port.idle for port in self._ports()
-                               if port.name in dropped})
+                               if port.name in dropped and not port.lasts})
             if values:
                 self._publish(values)
             self._sent = values
@@ -105,11 +113,12 @@ class Commander:
         self._publisher.wait_for_all_acked(Duration(seconds=1))
 
     def _ports(self):
-        mechanism = self._live.scene.mechanism
-        return mechanism.ports + mechanism.actuators
+        return self._live.scene.inputs
 
     def _publish(self, values):
-        """Publish values by name, None for a speed that is none."""
+        """Publish values by name, if any, None for a speed that is none."""
+        if not values:
+            return
         prefix = self._live.scene.node.joint_prefix
         ports = [port for port in self._ports() if port.name in values]
         command = CommandMessage(ports, prefix)

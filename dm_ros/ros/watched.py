@@ -8,24 +8,28 @@ import math
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Int8
 
 from dm_ros.ros.messages import never_called, Polled
 from dm_ros.ros.privates import poll
-from dm_ros.ros.serialized import Layout
-from dm_ros.settings import known_rows
+from dm_ros.ros.serialized import Layout, OdometryLayout
+from dm_ros.watch.scenes import known_names
 
 # best effort hears every publisher and makes none wait; deep enough for some seconds at 1 kHz
 HEARD = QoSProfile(depth=5000, reliability=ReliabilityPolicy.BEST_EFFORT)
 PATIENCE = 3.0    # s for the node to answer
 LOOK = 0.3        # s from one look at who is there to the next
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 TOPICS = {'joint_states': ('position', 'velocity', 'effort'), 'internal_moments': ('effort',),
           'clutches': ('position', 'velocity', 'effort'), 'power_flow_stamped': ('position',)}
+OF_OTHERS = {'tyres': ('position', 'velocity', 'effort')}   # likewise, of a driveline
 LEVELS = {b'\0': 'ok', b'\1': 'warn', b'\2': 'error', b'\3': 'stale'}
 
 
@@ -69,7 +73,7 @@ class Asked:
 
 
 class Watched:
-    """A node ``differential`` as another node sees it; call ``poll`` all the time."""
+    """A node that is shown, as another node sees it; call ``poll`` all the time."""
 
     def __init__(self, node, name, live, asked):
         """
@@ -82,10 +86,12 @@ class Watched:
         self._topic = node.resolve_topic_name(f'{name}/joint_states')
         polled = Polled()
 
-        def subscribe(message_type, topic):
-            return node.create_subscription(message_type, topic, never_called, HEARD,
+        def subscribe(message_type, topic, qos=HEARD):
+            return node.create_subscription(message_type, topic, never_called, qos,
                                             callback_group=polled)
-        self._topics = {topic: subscribe(JointState, f'{name}/{topic}') for topic in TOPICS}
+        self._subscribe = subscribe
+        self._topics, self._flows = {}, {}
+        self._listen(TOPICS)   # until there is a node of another kind
         self._diagnostics = subscribe(DiagnosticArray, '/diagnostics')
         self._events = subscribe(ParameterEvent, '/parameter_events')
         self._list = node.create_client(ListParameters, f'{name}/list_parameters')
@@ -94,6 +100,19 @@ class Watched:
         self._learning, self._last_look = False, -math.inf
         self._publishers = set()   # of joint states, as DDS knows them
 
+    def _listen(self, topics, flows=()):
+        """Hear these topics of the node, by last words, and no others."""
+        for heard, wanted in ((self._topics, topics), (self._flows, flows)):
+            for topic in heard.keys() - set(wanted):
+                self._node.destroy_subscription(heard.pop(topic))
+        for topic in topics:
+            if topic not in self._topics:
+                self._topics[topic] = self._subscribe(
+                    Odometry if topic == 'odometry' else JointState, f'{self._name}/{topic}')
+        for topic in flows:
+            if topic not in self._flows:
+                self._flows[topic] = self._subscribe(Int8, f'{self._name}/{topic}', NEWEST)
+
     def poll(self):
         """Take all that has come."""
         self._asked.poll()
@@ -101,9 +120,14 @@ class Watched:
         if now - self._last_look > LOOK:
             self._last_look = now
             self._look()
+        if self._live.scene is not self._scene:
+            self._begin(self._live.scene)
         for topic, subscription in self._topics.items():
             for data, _ in poll(subscription, raw=True):
                 self._take(topic, data)
+        for topic, subscription in self._flows.items():
+            for message, _ in poll(subscription):
+                self._live.put_flow(topic, message.data)
         for message, _ in poll(self._diagnostics):
             mine = [status for status in message.status if status.hardware_id == self._name]
             if mine and self._live.scene:
@@ -130,13 +154,23 @@ class Watched:
         self._learning = False
         self._live.went()
 
+    def _begin(self, scene):
+        """Hear what a scene is made of; None: what a node is known by that may come."""
+        self._scene, self._layouts = scene, {}
+        if not scene or not scene.odometry:   # clutches come and go with parameters
+            self._listen(TOPICS)
+        else:
+            self._listen(scene.topics, scene.flows)
+        if scene:
+            layouts = {topic: Layout(scene.frame, names, {**TOPICS, **OF_OTHERS}[topic])
+                       for topic, names in scene.names.items()}
+            if scene.odometry:
+                layouts['odometry'] = OdometryLayout(*scene.odometry)
+            self._layouts = {topic: (scene.topics.index(topic), layout)
+                             for topic, layout in layouts.items()}
+
     def _take(self, topic, data):
         """Take the bytes of a message of a topic."""
-        if self._live.scene is not self._scene:
-            self._scene = scene = self._live.scene
-            self._layouts = {topic: (index, Layout(scene.frame, names, TOPICS[topic]))
-                             for index, (topic, names) in enumerate(scene.names.items())
-                             } if scene else {}
         if topic in self._layouts:
             index, layout = self._layouts[topic]
             with suppress(ValueError):   # of a node before or after this one
@@ -144,13 +178,13 @@ class Watched:
 
     def _learn(self, learned):
         """Ask for all parameters, and let ``learned`` take them."""
-        self._learning = True
+        self._learning, known = True, known_names()
 
         def listed(response):
             if response is None:
                 self._learning = False
                 return
-            names = [name for name in response.result.names if name in known_rows()]
+            names = [name for name in response.result.names if name in known]
 
             def got(response):
                 self._learning = False

@@ -1,7 +1,7 @@
 # Copyright 2026 dm_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Serve a page that shows a running differential live, for a browser on this machine."""
+"""Serve a page that shows a running node live, for a browser on this machine."""
 
 import argparse
 import os
@@ -31,7 +31,8 @@ The page is at the URL that is printed, until Ctrl-C or SIGTERM. It shows the no
 and waits for it otherwise. Without --control nothing on the page reaches the node. A browser on
 another machine needs --host, and then everybody who reaches that address sees the page, and
 commands the node with --control: there is no password. Rather let ssh bring the port to you:
-ssh -L 8350:127.0.0.1:8350 MACHINE. A node in a namespace: --node /rear/differential.
+ssh -L 8350:127.0.0.1:8350 MACHINE. A node in a namespace: --node /rear/differential. A car:
+--node driveline.
 """
 
 
@@ -44,8 +45,8 @@ def parser():
     result.add_argument('--control', action='store_true',
                         help='let the page set torques, speeds and forces, pause, step and reset')
     result.add_argument('--node', default='differential', metavar='NAME',
-                        help='name of the differential node, in the namespace of this one or '
-                        'full; default: %(default)s')
+                        help='name of the node, a differential or a driveline, in the namespace '
+                        'of this one or full; default: %(default)s')
     result.add_argument('--host', default='127.0.0.1', metavar='ADDR',
                         help='address to which the page is bound; default: %(default)s, which '
                         'only this machine reaches')

@@ -89,10 +89,10 @@ class Commands:
             self._owners.add(viewer)
 
     def zero(self, viewer):
-        """Put zero into force for every port."""
+        """Put zero into force for every port, or what stands for it."""
         with self._lock:
             self._need_node()
-            self._values = {port['name']: 0.0 for port in self._ports}
+            self._values = {port['name']: port['zero'] for port in self._ports}
             self._owners.add(viewer)
 
     def release(self):

@@ -5,7 +5,7 @@
 
 import json
 
-from dm_ros.watch.scene import Scene
+from dm_ros.watch.scenes import scene_of
 from dm_ros.watch.ticks import Joined, Strips, Travel
 from dm_ros.watch.viewers import event
 
@@ -22,7 +22,7 @@ class Live:
     """
     The node as the viewers see it; all methods are for one thread.
 
-    :ivar scene: the ``Scene`` of the node, None while there is none.
+    :ivar scene: what ``scene_of`` returns for the node, None while there is none.
     """
 
     def __init__(self, name, viewers, commands):
@@ -44,18 +44,19 @@ class Live:
 
         :param values: ``{full name: value}``.
         """
-        scene = Scene(self._name, values)
+        scene = scene_of(self._name, values)
         self._fresh()
         self._strips = Strips(1 / scene.node.rate)
-        self._joined = Joined(len(scene.names))
+        self._joined = Joined(len(scene.topics))
         self._commands.begin(scene.ports)
         self._now, self._reports = None, []
         self._show(scene)
 
     def changed(self, values):
         """Take the parameters of the node after some have been changed, as ``came`` does."""
-        scene = Scene(self._name, values)
-        if self.scene and scene.names == self.scene.names:
+        scene = scene_of(self._name, values)
+        if self.scene and (scene.names, scene.topics) == (
+                self.scene.names, self.scene.topics):
             if scene.ports != self.scene.ports:
                 self._commands.begin(scene.ports)
             self._show(scene)
@@ -76,9 +77,13 @@ class Live:
         """
         Take a message of the node.
 
-        :param topic: which of ``scene.names``, by number; stamp: ns; arrays: of numbers.
+        :param topic: which of ``scene.topics``, by number; stamp: ns; arrays: of numbers.
         """
         self._joined.put(topic, stamp, arrays)
+
+    def put_flow(self, topic, flow):
+        """Take a power-flow index without a stamp; topic: one of ``scene.flows``."""
+        self.scene.take_flow(topic, flow)
 
     def reports(self, statuses):
         """Take what the node says of itself: a dictionary for each status."""
@@ -96,22 +101,16 @@ class Live:
             self._viewers.publish(event('commands', as_json(values)), change=change)
 
     def _tell_ticks(self):
-        ticks = self._joined.take()
+        ticks, scene = self._joined.take(), self.scene
         if not ticks:
             return
         for tick in ticks:
-            (position, velocity, torque), (moment,), *clutches, (flow,) = tick.parts
-            force = clutches[0][2] if clutches else ()
-            is_reset = self._travel.add(position)
-            self._strips.add(tick.stamp, self.scene.columns(
-                velocity, torque, moment, force, flow), is_reset)
+            is_reset = self._travel.add(scene.angles(tick.parts))
+            self._strips.add(tick.stamp, scene.row(tick.parts), is_reset)
         if len(ticks) == 1:   # it may be the last one for long
             self._strips.close()
-        now = {
-            'stamp': tick.stamp * 1e-9, 'ticks': len(ticks), 'lost': self._joined.lost,
-            'position': list(position), 'velocity': list(velocity), 'torque': list(torque),
-            'moment': list(moment), 'force': list(force),
-            'flow': flow[0], 'travel': self._travel.total}
+        now = {'stamp': tick.stamp * 1e-9, 'ticks': len(ticks), 'lost': self._joined.lost,
+               **scene.told(tick.parts, self._travel.total)}
         emptied, rows = self._strips.take()
 
         def change():

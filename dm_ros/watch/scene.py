@@ -95,7 +95,7 @@ def control_ports(mechanism, node, limits):
         result.append({
             'name': port.name, 'kind': port.kind, 'unit': port.unit,
             'low': max(port.low, -limit), 'high': limit,
-            'from': 0.0 if port.low == 0.0 else -reach, 'to': reach})
+            'zero': 0.0, 'from': 0.0 if port.low == 0.0 else -reach, 'to': reach})
     return result
 
 
@@ -106,9 +106,16 @@ class Scene:
     :ivar description: what the page is told, as JSON has it.
     :ivar names: ``{last word of a topic: names in its messages}`` of those that make a tick.
     :ivar frame: the ``frame_id`` of these messages.
+    :ivar topics: last words of the topics that make a tick, of JointStates first.
+    :ivar odometry: the frames of ``odometry`` where that is one of them, else None.
+    :ivar flows: last words of the topics of power-flow indices that have no stamp.
+    :ivar grouped: last word of the topic on which many inputs are commanded.
+    :ivar inputs: the ``Port`` s of the node.
     :ivar ports: what can be commanded, as ``control_ports`` returns it.
     :raises ValueError: for parameters that this version does not know or cannot have.
     """
+
+    grouped, odometry, flows = 'torques', None, ()
 
     def __init__(self, name, values):
         """:param name: full name of the node; values: its parameters, ``{full name: value}``."""
@@ -119,6 +126,7 @@ class Scene:
             mechanism, parameters, speed_ports(port_parameters(mechanism.inputs, values)))
         actuators = mechanism.actuators
         limits = dict(zip([port.name for port in actuators], (parameters.A_1, parameters.A_2)))
+        self.inputs = mechanism.ports + actuators
         self.ports = control_ports(mechanism, node, limits)
         strips = [('speeds', 'rad/s', mechanism.shafts), ('slip', 'rad/s', mechanism.outputs),
                   ('moments', 'N m', mechanism.moments), ('torques', 'N m', mechanism.inputs)]
@@ -133,9 +141,9 @@ class Scene:
         if len(mechanism.gears) > 2:   # what the pinion drives
             meshes = {mechanism.gears[0]: mechanism.shafts[0], **meshes}
         self.description = {
-            'node': name, 'variant': node.variant, 'title': mechanism.title,
-            'law': node.loss_law, 'mode': node.mode, 'rate': node.rate,
-            'timeout': node.torque_timeout,
+            'node': name, 'kind': 'differential', 'variant': node.variant,
+            'title': mechanism.title, 'law': node.loss_law, 'mode': node.mode, 'rate': node.rate,
+            'timeout': node.torque_timeout, 'grouped': self.grouped,
             'shafts': mechanism.shafts, 'inputs': mechanism.inputs, 'outputs': mechanism.outputs,
             'moments': mechanism.moments, 'meshes': meshes,
             'clutches': dict(zip(mechanism.clutch_moments, mechanism.clutches)),
@@ -144,6 +152,7 @@ class Scene:
             'ports': self.ports, 'gears': drawing, 'not drawn': refusal}
         published = Published(mechanism, node.joint_prefix)
         self.names, self.frame = published.names, published.frame
+        self.topics = tuple(self.names)
         self._inputs = [mechanism.shafts.index(shaft) for shaft in mechanism.inputs]
         self._outputs = [mechanism.shafts.index(shaft) for shaft in mechanism.outputs]
 
@@ -152,3 +161,23 @@ class Scene:
         carrier = velocity[0]
         return (*velocity, *(velocity[i] - carrier for i in self._outputs), *moment,
                 *(torque[i] for i in self._inputs), *force, *flow)
+
+    def angles(self, parts):
+        """Return the angles of all shafts in a tick, rad; parts: of a ``Tick``."""
+        return parts[0][0]
+
+    def row(self, parts):
+        """Return the numbers of a tick in the order of the strips."""
+        (_, velocity, torque), (moment,), *clutches, (flow,) = parts
+        return self.columns(velocity, torque, moment, clutches[0][2] if clutches else (), flow)
+
+    def told(self, parts, travel):
+        """
+        Return what the page is told of a tick.
+
+        :param travel: how far all shafts have turned, rad.
+        """
+        (position, velocity, torque), (moment,), *clutches, (flow,) = parts
+        return {'position': list(position), 'velocity': list(velocity), 'torque': list(torque),
+                'moment': list(moment), 'force': list(clutches[0][2] if clutches else ()),
+                'flow': flow[0], 'travel': travel}

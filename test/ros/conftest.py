@@ -7,11 +7,13 @@ from contextlib import ExitStack
 import math
 import os
 from pathlib import Path
+import re
 import shutil
 import sys
 import time
 
 from command_line import asked
+from pages import Page
 from processes import command, Forked
 import pytest
 import rclpy
@@ -132,6 +134,50 @@ def ros(monkeypatch):
         user = Ros(monkeypatch, domain)
         yield user
         user.close()
+
+
+@pytest.fixture
+def drive(ros):
+    """Return a function that starts a node ``driveline`` in this process."""
+    nodes = []
+
+    def drive(**parameters):
+        node = DrivelineNode(context=ros.context, parameter_overrides=[
+            Parameter(name.replace('__', '.'), value=value) for name, value in parameters.items()])
+        nodes.append(node)
+        ros.executor.add_node(node)
+        node.start()
+        return node
+    yield drive
+    for node in nodes:
+        ros.executor.remove_node(node)
+        node.close()
+
+
+@pytest.fixture
+def start(ros):
+    """Return a function that starts ``watch``; returns the process and its port."""
+    with ExitStack() as stack:
+        def start(*arguments):
+            process = stack.enter_context(
+                Forked(command('watch'), '--port', 0, *arguments))
+            process.says('/\n')
+            return process, int(re.search(r':(\d+)/\n', process.output).group(1))
+        yield start
+
+
+@pytest.fixture
+def page(start):
+    """Return a function that starts ``watch`` and returns a ``Page`` of it."""
+    pages = []
+
+    def page(*arguments):
+        _, port = start(*arguments)
+        pages.append(Page(port))
+        return pages[-1]
+    yield page
+    for one in pages:
+        one.close()
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / 'README.md', ROOT / 'examples' / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
 AXLE = ROOT / 'config' / 'presets' / 'actuated_axle.yaml'
 # what runs until a signal: how one sees that it does, None where a node hears it
-STARTS_A_NODE = 'ros2 run dm_ros differential', 'ros2 launch '
+STARTS_A_NODE = 'ros2 run dm_ros differential', 'ros2 run dm_ros driveline', 'ros2 launch '
 LASTING = {**dict.fromkeys(STARTS_A_NODE, ' Hz, '), 'ros2 run dm_ros play_torques': 'playing',
            'ros2 run dm_ros watch': 'watching ',
            'ros2 topic pub': None, 'ros2 topic echo': 'position:', 'ros2 bag record': 'Subscribed'}

@@ -3,15 +3,18 @@
 
 """The numbers read from the bytes of a message are those of the message."""
 
+from math import cos, sin
+
 from hypothesis import given
 from hypothesis import strategies as st
+from nav_msgs.msg import Odometry
 import pytest
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from dm_ros.ros.messages import never_called, Polled
 from dm_ros.ros.privates import poll
-from dm_ros.ros.serialized import ALL, Layout
+from dm_ros.ros.serialized import ALL, Layout, OdometryLayout
 from dm_ros.ros.watched import TOPICS
 from dm_ros.watch.scene import Scene
 
@@ -54,6 +57,25 @@ def test_another_frame_is_read_as_a_whole_and_other_names_are_refused():
                            (['one', 'two'], {'velocity': [3.0, 4.0]}), (['one', 'two'], {})):
         with pytest.raises(ValueError, match='one'):
             layout.read(message('a', names, 1, 2, numbers))
+
+
+@given(st.text('abc_/', max_size=9), st.text('abc_/', max_size=9), st.floats(-3.1, 3.1))
+def test_the_bytes_have_the_motion_of_an_odometry(frame, child, yaw):
+    odometry = Odometry(child_frame_id=child)
+    odometry.header.frame_id, odometry.header.stamp.sec = frame, 7
+    pose, twist = odometry.pose.pose, odometry.twist.twist
+    pose.position.x, pose.position.y = 3.0, -4.0
+    pose.orientation.z, pose.orientation.w = sin(0.5 * yaw), cos(0.5 * yaw)
+    twist.linear.x, twist.linear.y, twist.angular.z = 1.0, -2.0, 0.5
+    odometry.pose.covariance[:] = odometry.twist.covariance[:] = [9.0] * 36
+    data = bytes(serialize_message(odometry))
+    layout = OdometryLayout(frame, child)
+    layout.read_whole = None
+    stamp, (place, motion) = layout.read(data)
+    assert stamp == 7_000_000_000 and motion == (1.0, -2.0, 0.5)
+    assert place == (3.0, -4.0, pytest.approx(yaw, abs=1e-12))
+    with pytest.raises(ValueError, match='the frames are'):
+        OdometryLayout(frame, f'{child}x').read(data)
 
 
 @pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])

@@ -3,16 +3,11 @@
 
 """``watch`` beside nodes over real topics: what it tells is what they publish."""
 
-from contextlib import ExitStack, suppress
-from http.client import HTTPConnection
-import json
-import queue
-import re
 import signal
-import socket
 import threading
 import time
 
+from pages import ask, Page, stamp_of
 from processes import command, Forked
 import pytest
 from rclpy.parameter import Parameter
@@ -22,104 +17,6 @@ from sensor_msgs.msg import JointState
 from dm_ros.mechanism.variants import MECHANISMS
 from dm_ros.ros.messages import LOCKSTEP_OUTPUT_QOS
 from dm_ros.watch.ticks import LONGEST_GAP
-
-
-class Page:
-    """What a browser hears of ``watch``: the last event of each name."""
-
-    def __init__(self, port):
-        self._port = port
-        self.token = self._token()
-        self._connection = HTTPConnection('127.0.0.1', port, timeout=60.0)
-        self._connection.request('GET', '/events')
-        self._socket = self._connection.sock
-        self._file = self._connection.getresponse()
-        assert self._file.status == 200
-        self.last, self.rows, self.history = {}, [], queue.SimpleQueue()
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _token(self):
-        connection = HTTPConnection('127.0.0.1', self._port, timeout=60.0)
-        connection.request('GET', '/')
-        found = re.search('name="token" content="(.*?)"',
-                          connection.getresponse().read().decode())
-        return found and found.group(1)
-
-    def _read(self):
-        name = None
-        try:
-            while line := self._file.readline().decode():
-                if line.startswith('event: '):
-                    name = line.removeprefix('event: ').strip()
-                elif line.startswith('data: '):
-                    self._take(name, json.loads(line.removeprefix('data: ')))
-        except (OSError, ValueError, AttributeError):   # closed
-            pass
-
-    def _take(self, name, data):
-        if name == 'ticks':
-            if data['emptied']:
-                self.rows = []
-            self.rows += data['rows']
-        if name == 'scene' and data.get('variant') not in (None, self.variant):
-            self.last.pop('ticks', None)   # those were of another node
-        self.last[name] = data
-        self.history.put((name, data))
-
-    @property
-    def now(self):
-        """The newest tick, {} while there is none."""
-        return self.last.get('ticks', {}).get('now') or {}
-
-    @property
-    def variant(self):
-        """The variant that is shown, None while the page waits."""
-        return self.last.get('scene', {}).get('variant')
-
-    def ask(self, **request):
-        """Return status and answer of a command."""
-        connection = HTTPConnection('127.0.0.1', self._port, timeout=60.0)
-        connection.request('POST', '/control', json.dumps(
-            {'viewer': self.last['viewer'], **request}), {
-                'Content-Type': 'application/json', 'X-Watch-Token': self.token or ''})
-        response = connection.getresponse()
-        text = response.read().decode()
-        return response.status, json.loads(text) if response.status == 200 else text
-
-    def close(self):
-        """Leave."""
-        with suppress(OSError):   # the server was faster
-            self._socket.shutdown(socket.SHUT_RDWR)
-
-
-@pytest.fixture
-def start(ros):
-    """Return a function that starts ``watch``; returns the process and its port."""
-    with ExitStack() as stack:
-        def start(*arguments):
-            process = stack.enter_context(
-                Forked(command('watch'), '--port', 0, *arguments))
-            process.says('/\n')
-            return process, int(re.search(r':(\d+)/\n', process.output).group(1))
-        yield start
-
-
-@pytest.fixture
-def page(start):
-    """Return a function that starts ``watch`` and returns a ``Page`` of it."""
-    pages = []
-
-    def page(*arguments):
-        _, port = start(*arguments)
-        pages.append(Page(port))
-        return pages[-1]
-    yield page
-    for one in pages:
-        one.close()
-
-
-def stamp_of(message):
-    return message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
 
 
 @pytest.mark.parametrize('variant', ['symmetric_ode', 'lsd_ode'])
@@ -212,14 +109,6 @@ def test_a_reset_in_simulated_time_empties_the_strips(ros, page):
     assert ask(ros, it, do='reset')[1]['success'] and node.simulation.ticks == 0
     ros.until(lambda: it.rows and it.now['stamp'] == 0.0)
     assert [row[0] for row in it.rows if row] == [0.0]
-
-
-def ask(ros, page, **request):
-    """Return what ``page.ask`` does, while the nodes of this process spin."""
-    answers = queue.SimpleQueue()
-    threading.Thread(target=lambda: answers.put(page.ask(**request))).start()
-    ros.until(lambda: not answers.empty())
-    return answers.get()
 
 
 def test_a_slider_goes_out_again_and_again_and_ends_with_its_page(ros, page):

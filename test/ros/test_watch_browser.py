@@ -26,9 +26,9 @@ pytestmark = pytest.mark.skipif(not (BROWSER and DRIVER), reason='no Chromium wi
 PICTURE = "return document.getElementById('drawing').toDataURL()"
 # the pictures of some frames, so that what turns has time to turn
 PICTURES = """
-const [count, done] = arguments, seen = [];
+const [count, id, done] = arguments, seen = [];
 const look = () => {
-  seen.push(document.getElementById('drawing').toDataURL());
+  seen.push(document.getElementById(id).toDataURL());
   if (seen.length < count) setTimeout(() => requestAnimationFrame(look), 30);
   else done(new Set(seen).size);
 };
@@ -111,9 +111,9 @@ class Screen:
         return {shaft: float(text.split()[0].replace('\N{MINUS SIGN}', '-'))
                 for shaft, text in found if text != '\N{EN DASH}'}
 
-    def different(self, count):
+    def different(self, count, of='drawing'):
         """Return how many of some pictures in a row differ."""
-        return self.driver.execute_async_script(PICTURES, count)
+        return self.driver.execute_async_script(PICTURES, count, of)
 
     def move(self, name, value):
         """Move a slider, as a hand does."""
@@ -468,3 +468,138 @@ def test_the_teeth_mesh_wherever_the_shafts_are(ros, screen):
         MESHING, [Scene('/d', value).description for value in values])
     assert pairs > 60 and turned > 0.4
     assert worst < 1e-9 and math.isfinite(worst)
+
+
+# how many pixels of arrows of force are before and behind the middles of the front and rear wheels
+FORCES = """
+const canvas = document.getElementById('car'), {width, height} = canvas;
+const dense = height / canvas.clientHeight;
+const context = new OffscreenCanvas(width, height).getContext('2d', {willReadFrequently: true});
+context.drawImage(canvas, 0, 0);
+const {data} = context.getImageData(0, 0, width, height);
+const force = [0xc4, 0x18, 0x6b];
+return [0, 2].map(wheel => {
+  const middle = dense * parseFloat(document.querySelectorAll('#wheels .label')[wheel].style.top);
+  const counts = [0, 0];
+  for (let i = 0; i < data.length; i += 4) {
+    const away = Math.floor(i / 4 / width) - middle;
+    if (Math.abs(away) < 60 * dense && force.every((x, k) => Math.abs(data[i + k] - x) < 8)) {
+      counts[Number(away > 0)] += 1;
+    }
+  }
+  return counts;
+});
+"""
+
+
+def test_the_page_tells_how_to_start_a_driveline_that_it_waits_for(ros, screen, drive):
+    it = screen('--node', 'driveline')
+    ros.until(lambda: 'ros2 run dm_ros driveline' in it.text('#waiting'))
+    name, effort = re.search(r'name: \[(\w+)\], effort: \[(.+?)\]', it.text('#waiting')).groups()
+    node = drive()
+    ros.publisher(JointState, '/driveline/commands').publish(
+        JointState(name=[name], effort=[float(effort)]))
+    ros.until(lambda: node.plant.inputs.received)
+    assert not node.plant.inputs.refused
+
+
+def test_a_car_goes_by_turns_its_wheels_and_stands_while_paused(ros, screen, drive):
+    node = drive(planar=True, initial_speed=15.0)
+    it = screen('--node', 'driveline')
+    ros.until(lambda: it.text('#state') == 'running')
+    assert it.text('#kind') == 'awd planar, 200 Hz, realtime'
+    ros.until(lambda: it.different(8, 'car') > 4)
+    node.control.running.clear()
+    ros.until(lambda: it.different(12, 'car') == 1)
+    node.control.running.set()
+    ros.until(lambda: it.different(8, 'car') > 4)
+    assert not it.driver.find_element('id', 'drawing').is_displayed()
+
+
+def test_the_labels_of_wheels_have_the_numbers_of_the_topics(ros, screen, drive):
+    drive(layout='rwd', planar=True, mode='lockstep', initial_speed=12.0)
+    heard = {topic: ros.listen(JointState, f'/driveline/{topic}')
+             for topic in ('joint_states', 'tyres')}
+    it = screen('--node', 'driveline')
+    ros.until(lambda: it.text('#state') == 'waits for messages on ~/commands')
+    commands = ros.node.create_publisher(JointState, '/driveline/commands', 1000)
+    ros.until(lambda: commands.get_subscription_count())
+
+    def is_told():   # a message that is lost makes no tick: another one does
+        if 'rear_left' in it.numbers('speed'):
+            return True
+        commands.publish(JointState(name=['input', 'steer'], effort=[900.0, math.nan],
+                                    position=[math.nan, 0.08]))
+        return False
+    ros.until(is_told)
+
+    def is_the_last():
+        joints, tyres = (messages[-1] for messages in heard.values())
+        speed, force = dict(zip(joints.name, joints.velocity)), dict(zip(tyres.name, tyres.effort))
+        told = it.numbers('speed')
+        wheels = [name for name in told if name != 'body']
+        return len(wheels) == 4 and all(
+            told[wheel] == pytest.approx(speed[wheel], rel=1e-3, abs=6e-4) and
+            it.numbers('force')[wheel] == pytest.approx(math.hypot(
+                force[f'{wheel}_longitudinal'], force[f'{wheel}_lateral']), abs=0.51)
+            for wheel in wheels)
+    ros.until(is_the_last)
+    assert it.numbers('speed')['body'] == pytest.approx(12.0, abs=1.0)
+
+
+def test_arrows_point_where_the_road_pushes_and_powers_have_their_direction(ros, screen, drive):
+    drive(initial_speed=25.0)
+    it = screen('--node', 'driveline')
+    ros.until(lambda: it.text('#state') == 'running')
+    commands = ros.node.create_publisher(JointState, '/driveline/commands', 10)
+
+    def pushed(torque):
+        commands.publish(JointState(name=['input'], effort=[torque]))
+        (before, behind), (before_rear, behind_rear) = it.driver.execute_script(FORCES)
+        power = it.numbers('power')
+        way = -1 if torque < 0 else 1
+        if way < 0:
+            before, behind, before_rear, behind_rear = behind, before, behind_rear, before_rear
+        return (before > 2 * behind + 20 and before_rear > 2 * behind_rear + 20
+                and all(way * number > 1.0 for number in power.values()) and len(power) == 9)
+    for torque in (900.0, -900.0):
+        ros.until(lambda: pushed(torque))  # noqa: B023
+
+
+def test_a_driveline_is_steered_by_a_slider(ros, screen, drive):
+    node = drive(planar=True, initial_speed=5.0)
+    it = screen('--node', 'driveline', '--control')
+    ros.until(lambda: it.text('#state') == 'running')
+    assert it.port('front_left_grip')[2:] == [pytest.approx(1.0), '1', True]
+    it.type('front_left_grip', '0.2', Keys.ENTER)
+    it.move('steer', 0.1)
+
+    def held():
+        return dict(zip(node.plant.inputs.names, node.plant.inputs.in_force(
+            node.simulation.ticks)))
+    ros.until(lambda: (held()['steer'], held()['front_left_grip']) == (
+        pytest.approx(0.1, abs=2e-3), 0.2))
+    it.move('rear_left_grip', 0)   # the least that there is, which is not 0
+    ros.until(lambda: held()['rear_left_grip'] == 1e-6)
+    it.press('Zero all')
+    ros.until(lambda: held()['steer'] == 0.0 and held()['front_left_grip'] == 1.0)
+    ros.until(lambda: it.port('front_left_grip')[3] == '1')
+    assert not node.plant.inputs.refused
+
+
+@pytest.mark.parametrize('width', [360, 1280])
+def test_all_of_a_car_is_within_the_width_of_the_screen(ros, screen, chromium, drive, width):
+    drive(planar=True, initial_speed=15.0)
+    with width_of(chromium, width):
+        it = screen('--node', 'driveline', '--control')
+        ros.until(lambda: it.text('#state') == 'running' and it.numbers('speed'))
+        ros.until(lambda: len(it.driver.find_elements('css selector', '.uplot canvas')) == 5)
+        ros.until(lambda: it.driver.execute_script(
+            'return document.documentElement.scrollWidth') <= width)
+        boxes = it.driver.execute_script(
+            'return [...document.querySelectorAll(".label")].map(e => e.getBoundingClientRect())')
+        assert len(boxes) == 5
+        for n, one in enumerate(boxes):
+            for other in boxes[:n]:
+                assert (one['left'] >= other['right'] or other['left'] >= one['right']
+                        or one['top'] >= other['bottom'] or other['top'] >= one['bottom'])

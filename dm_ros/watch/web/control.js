@@ -45,7 +45,8 @@ export class Control {
     this.waiting = null;
     this.element.hidden = !scene || !this.token;
     if (this.element.hidden) return;
-    const lockstep = scene.mode === 'lockstep', rows = make('div', 'rows');
+    const lockstep = scene.mode === 'lockstep';
+    const rows = make('div', scene.ports.length > 8 ? 'rows long' : 'rows');
     for (const port of scene.ports) rows.append(this.#row(port));
     const buttons = make('div', 'buttons');
     const button = (text, request, title, strong = false) => {
@@ -55,12 +56,14 @@ export class Control {
       made.addEventListener('click', () => this.#ask(request));
       buttons.append(made);
     };
-    button('Zero all', {do: 'zero'}, 'command zero on every shaft and clutch', true);
+    button('Zero all', {do: 'zero'}, scene.ports.some(({zero}) => zero)
+      ? 'command zero on all of these, and whole grip and contact'
+      : 'command zero on every shaft and clutch', true);
     button('Let go', {do: 'release'}, 'command nothing any more');
     if (lockstep) {
       for (const count of TICKS) {
         button(`${count} tick${count > 1 ? 's' : ''}`, {do: 'ticks', count},
-          'send so many messages on ~/torques with what the sliders have');
+          `send so many messages on ~/${scene.grouped} with what the sliders have`);
       }
     }
     button('Pause', {do: 'pause'}, 'stop the ticks');
@@ -77,7 +80,9 @@ export class Control {
         ? 'In lockstep each message is a tick: the sliders go out when you press a number of ticks. '
           + 'What was sent holds until another message or a reset.'
         : 'What you move is sent again and again while this page is open, and zero when you let '
-          + 'go or leave. What you did not move is left to others.'));
+          + 'go or leave'
+          + (scene.kind === 'driveline' ? ' where it is a torque or a force; the rest stays. ' : '. ')
+          + 'What you did not move is left to others.'));
     this.tell(this.told);
   }
 
@@ -88,7 +93,7 @@ export class Control {
       const touched = name in values;
       row.label.classList.toggle('untouched', !touched);
       if (this.waiting && name in this.waiting || row.held || row.typing) continue;
-      this.#put(row, values[name] ?? 0);
+      this.#put(row, values[name] ?? row.zero);
     }
   }
 
@@ -110,19 +115,20 @@ export class Control {
     field.inputMode = 'decimal';
     field.autocomplete = 'off';
     field.title = `${port.low} to ${port.high} ${port.unit}: Enter or Tab takes it, Esc gives it up`;
-    slider.value = 0;
-    field.value = '0';
+    slider.value = port.zero;
+    field.value = String(port.zero);
     slider.setAttribute('aria-label', `${port.name} ${port.kind}`);
     field.setAttribute('aria-label', `${port.name} in ${port.unit}`);
     slider.name = field.name = port.name;
-    const row = {label, slider, field, held: false, typing: false};
+    const row = {label, slider, field, zero: port.zero, held: false, typing: false};
     slider.addEventListener('pointerdown', () => { row.held = true; });
     for (const end of ['pointerup', 'pointercancel', 'blur']) {
       slider.addEventListener(end, () => { row.held = false; });
     }
     slider.addEventListener('input', () => {
       // the middle of a slider is hard to hit
-      const near = Math.abs(slider.value) < (slider.max - slider.min) / 150 ? 0 : Number(slider.value);
+      const near = Math.max(port.low,
+        Math.abs(slider.value) < (slider.max - slider.min) / 150 ? 0 : Number(slider.value));
       row.typing = false;
       field.value = String(Number(near.toPrecision(4)));
       this.#set(port.name, near);
@@ -146,13 +152,14 @@ export class Control {
         this.#set(port.name, value);
       }
     });
-    label.append(make('span', '', words(port.name)), slider, field, make('span', 'none', port.unit));
+    label.append(make('span', '', words(port.name)), slider, field,
+      make('span', 'none', port.unit === '1' ? '' : port.unit));
     this.rows.set(port.name, row);
     return label;
   }
 
   // The value that a port has, or has as soon as the server takes it.
-  #inForce(name) { return this.waiting?.[name] ?? this.told[name] ?? 0; }
+  #inForce(name) { return this.waiting?.[name] ?? this.told[name] ?? this.rows.get(name).zero; }
 
   // Send a value soon, together with others that change meanwhile.
   #set(name, value) {
@@ -206,7 +213,7 @@ export class Control {
     if (work === 'set') this.tell({...this.told, ...values});
     if (!ENDS.includes(work)) return;
     for (const row of this.rows.values()) row.held = row.typing = false;
-    this.tell(work === 'zero' ? Object.fromEntries([...this.rows.keys()].map(name => [name, 0])) : {});
+    this.tell(work === 'zero' ? Object.fromEntries([...this.rows].map(([name, {zero}]) => [name, zero])) : {});
   }
 
   #say(text, bad) {

@@ -3,9 +3,10 @@
 
 // The page: takes the events of the server and lets each part show them.
 
+import {CarView} from './car.js';
 import {Control} from './control.js';
-import {Drawing} from './drawing.js';
-import {Diagnostics, Labels, Legend, Most, numbersOf, powersOf} from './panels.js';
+import {DifferentialView} from './differential.js';
+import {Diagnostics} from './panels.js';
 import {Strips} from './strips.js';
 
 const AGAIN = 2000;      // ms until the server is asked again
@@ -15,17 +16,13 @@ const SPARING = 30;      // s for which fewer frames are drawn after too many we
 const SILENT = 1;        // s without a tick, or some ticks of a slow node
 const $ = id => document.getElementById(id);
 
-const drawing = new Drawing($('drawing'));
-const strips = new Strips($('strips'), drawing.colours);
-const labels = new Labels($('labels')), legend = new Legend($('legend'));
+const views = {differential: new DifferentialView(), driveline: new CarView()};   // by kind of node
+let view = views.differential;
+const strips = new Strips($('strips'), view.colours);
 const diagnostics = new Diagnostics($('diagnostics'), $('alarm'));
 const control = new Control($('control'));
-drawing.onResize = () => {
-  drawing.labels = labels.boxes($('drawing').getBoundingClientRect());
-};
-let scene = null, shown = null, newest = null;   // of the node, of the last one, its powers
+let scene = null, shown = null, newest = null;   // of the node, of the last one, its last tick
 let heard = null, connected = false, paused = false;
-let most = {power: new Most(), heat: new Most()};
 
 const seconds = () => performance.now() / 1000;
 
@@ -37,9 +34,9 @@ control.onDone = work => {
 };
 
 function show(description) {
-  const same = scene && description.variant
+  const same = scene && description.kind === scene.kind
     && JSON.stringify(scene.strips) === JSON.stringify(description.strips);
-  scene = description.variant ? description : null;
+  scene = description.kind ? description : null;
   heard = held = null;
   paused = false;
   document.title = `${description.node} \u2013 watch`;
@@ -54,28 +51,29 @@ function show(description) {
   $('how').textContent = how(description.node);
   control.show(scene);
   if (shown && !scene) return;
-  $('kind').textContent = scene
-    ? `${scene.variant}, ${scene.rate} Hz, ${scene.mode}, ${scene.law} law of losses` : '';
-  $('loss').textContent = '';
   newest = null;
-  most = {power: new Most(), heat: new Most()};
-  drawing.show(scene);
-  labels.show(scene, drawing.colours);
-  drawing.onResize();
-  legend.show(scene, drawing.colours);
+  view = views[scene?.kind] ?? view;
+  for (const other of Object.values(views)) other.show(other === view ? scene : null);
+  $('kind').textContent = scene ? view.title(scene) : '';
+  $('loss').textContent = '';
   if (!same) {
     strips.show(scene);
     diagnostics.tell([]);
   }
   $('scale').textContent = '';
-  $('note').textContent = !scene ? '' : !scene.gears ? `not drawn: ${scene['not drawn']}`
-    : scene.gears.exact ? '' : 'ratios and numbers of gears are drawn near the true ones';
+  $('note').textContent = scene ? view.note(scene) : '';
 }
 
 // The commands that start a node of this name, and a load.
 function how(node) {
   const [, space, name] = node.match(/^(.*)\/([^/]+)$/);
   const inSpace = space ? ` -r __ns:=${space}` : '';
+  if (name.includes('driveline')) {
+    const other = name === 'driveline' ? '' : ` -r __node:=${name}`;
+    return `ros2 run dm_ros driveline --ros-args -p planar:=true${inSpace}${other}\n`
+      + `ros2 topic pub -r 50 ${node}/commands sensor_msgs/msg/JointState `
+      + "'{name: [input], effort: [200.0]}'";
+  }
   const renamed = name === 'differential' ? '' : ` -r __node:=${name}`;
   return `ros2 run dm_ros differential --ros-args -p variant:=lsd_ode${inSpace}${renamed}\n`
     + `ros2 run dm_ros play_torques --variant lsd_ode${renamed && ` --node ${name}`}`
@@ -88,17 +86,11 @@ function ticks({emptied, rows, now}) {
   if (!now) return;
   heard = seconds();
   paused = false;
-  labels.tell(now);
-  strips.tell(numbersOf(scene, now));
-  drawing.turn(now.travel, Math.max(...now.velocity.map(Math.abs)), heard);
-  const powers = powersOf(scene, now);
-  powers.most = {power: most.power.of(Object.values(powers.meshes).concat(
-    Object.values(powers.shafts)), heard), heat: most.heat.of(Object.values(powers.clutches), heard)};
-  newest = {now, powers};
-  drawing.colour(powers);
-  legend.tell(powers);
-  if (scene.gears) {
-    const slower = Math.round(1 / drawing.scale);
+  newest = now;
+  view.tell(now, heard);
+  strips.tell(view.numbers(now));
+  if (view.scale) {
+    const slower = Math.round(1 / view.scale);
     $('scale').textContent = slower > 1 ? `drawn at 1/${slower} speed` : 'drawn at true speed';
   }
   if (now.lost) $('loss').textContent = `${now.lost} tick${now.lost > 1 ? 's' : ''} not heard whole`;
@@ -119,7 +111,7 @@ function state() {
   const quiet = heard === null ? Infinity : seconds() - heard;
   if (quiet < Math.max(SILENT, 5 / scene.rate)) return ['running', 'ok'];
   if (paused) return ['paused', 'warn'];
-  if (scene.mode === 'lockstep') return ['waits for messages on ~/torques', ''];
+  if (scene.mode === 'lockstep') return [`waits for messages on ~/${scene.grouped}`, ''];
   return [heard === null ? 'no tick yet' : `no tick for ${Math.round(quiet)} s`, 'warn'];
 }
 
@@ -161,7 +153,7 @@ function frame() {
   }
   const sparing = now < sparingUntil;
   if (!sparing || now - turned > LATE) {
-    drawing.frame(now - turned);
+    view.frame(now - turned);
     turned = now;
   }
   if (now - drawn > (sparing ? 2 : 1) * STRIPS) {
@@ -172,13 +164,9 @@ function frame() {
 }
 
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
-  strips.recolour(drawing.colours);
-  labels.show(shown, drawing.colours);
-  legend.show(shown, drawing.colours);
-  if (!newest) return;
-  labels.tell(newest.now);
-  legend.tell(newest.powers);
-  strips.tell(numbersOf(shown, newest.now));
+  for (const other of Object.values(views)) other.recolour();
+  strips.recolour(view.colours);
+  if (newest) strips.tell(view.numbers(newest));
 });
 setInterval(tellState, 200);
 connect();

@@ -4,18 +4,20 @@
 // The strips: lines of the last 30 s, which uPlot draws.
 
 import {role} from './colours.js';
-import {number} from './words.js';
+import {number, words} from './words.js';
 
 const SPAN = 30;            // s
 const LEAST = 1e-3;         // of a unit, that an axis spans at least: less is rounding
 const LAST = 24;            // px of the axis of time, below the last strip
 const TITLES = {speeds: 'Speeds', slip: 'Ahead of the carrier', moments: 'Internal moments',
-  torques: 'Torques', forces: 'Clutch forces', index: 'Power flow'};
+  torques: 'Torques', forces: 'Clutch forces', index: 'Power flow', wheels: 'Wheels',
+  body: 'Body', yaw: 'Yaw', halves: 'Half-shafts', shafts: 'Shafts'};
 
 const SYNC = uPlot.sync('strips');
 
 // What a number of a series is called, which colour it has, and whether its line is dashed.
 function drawn(scene, name) {
+  if (scene.colours) return {colour: scene.colours[name], dashed: false};
   const shaft = scene.meshes[name] || scene.clutches[name] || name;
   return {colour: name === 'power_flow' ? 0 : role(scene.shafts, shaft),
     dashed: name in scene.clutches};
@@ -128,7 +130,7 @@ export class Strips {
       if (dashed) dash.className = 'dashed';
       value.className = 'number';
       value.dataset.series = `${strip.name}.${name}`;
-      key.append(dash, strip.name === 'index' ? '' : name.replace('_', ' '), value);
+      key.append(dash, strip.name === 'index' ? '' : this.scene.short?.[name] ?? words(name), value);
       header.append(key);
       keys.push(value);
       return {label: name, stroke: lines[colour], width: 1.4, dash: dashed ? [5, 3] : undefined,

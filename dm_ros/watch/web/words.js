@@ -16,6 +16,11 @@ export function number(value) {
   return (/^-0(\.0*)?$/.test(short) ? short.slice(1) : short).replace('-', MINUS);
 }
 
+// A number with so many digits behind the point; what rounds to zero has no sign.
+export function fixed(value, digits) {
+  return value.toFixed(digits).replace(/^-(0(\.0*)?)$/, '$1').replace('-', MINUS);
+}
+
 // A power in W or kW.
 export function power(value) {
   const size = Math.abs(value);
