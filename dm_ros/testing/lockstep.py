@@ -3,6 +3,7 @@
 
 """A node in lockstep, in a test's own process, in a ROS domain of its own."""
 
+from collections import Counter
 import os
 import time
 
@@ -181,11 +182,21 @@ class LockstepDriven:
 
     def _await_connections(self):
         end = time.monotonic() + PATIENCE
-        while not self.node.is_connected():
+        while not (self.node.is_connected() and self._hears_all()):
             if time.monotonic() > end:
                 raise TimeoutError(f'nobody publishes on /{self.name}/{self.node.plant.grouped} '
                                    f'and listens to /{self.name}/joint_states')
             self.executor.spin_once(timeout_sec=0.01)
+
+    def _hears_all(self):
+        """Return whether what the nodes of the test subscribe to has found them, and they us."""
+        wanted = Counter(subscription.topic_name for node in self._attached
+                         for subscription in node.subscriptions)
+        commanding = sum(publisher.topic_name == self.node.inputs.grouped.topic_name
+                         for node in self._attached for publisher in node.publishers)
+        return self.node.inputs.grouped.get_publisher_count() >= commanding and all(
+            publisher.get_subscription_count() >= wanted[publisher.topic_name]
+            for publisher, _ in self.node.outputs.of_a_tick)
 
     def _detach(self):
         for node in self._attached:
