@@ -15,7 +15,6 @@ from dm_ros.mechanism.parameters import row
 from dm_ros.settings import LoopParameters
 
 FRAME = r'[A-Za-z][A-Za-z0-9_/.-]*', 'a letter and then letters, digits and any of _ / . -'
-DEMANDED = 'torque', 'force'   # kinds of ports that a stale demand leaves; a brake is no such one
 TOPICS = {'torque': 'torque/{}', 'capacity': 'brake/{}', 'force': 'clutch/{}', 'angle': '{}',
           'tangent': '{}'}     # of single ports, by their kind; others follow their names
 
@@ -87,16 +86,10 @@ def make_driveline(values, dt=None):
 
 def node_ports(car):
     """Return the ``Port`` s of a ``Driveline`` as a node has them: all but the wind."""
-    ports = []
-    for port in car.ports:
-        if port.name == 'wind':
-            continue
-        if port.name == 'steer' and not car.planar:
-            port = port._replace(low=0.0, high=0.0)   # the body cannot turn
-        by_effort = port.kind in (*DEMANDED, 'capacity')
-        ports.append(port._replace(array='effort' if by_effort else 'position',
-                                   lasts=port.kind not in DEMANDED))
-    return tuple(ports)
+    straight = {} if car.planar else {
+        'low': 0.0, 'high': 0.0, 'note': 'the body cannot turn unless it is planar'}
+    return tuple([port._replace(**straight) if port.name == 'steer' else port
+                  for port in car.ports if port.name != 'wind'])
 
 
 def step_arguments(car):
@@ -215,6 +208,10 @@ class DrivelinePlant(Driven):
                           self.simulation.force_limits))
         self.limit(tuple([forces.get(port.name, limits.get(port.kind, math.inf))
                           for port in self.inputs.ports]))
+
+    def _notice_coarse(self, count):
+        """Count them alone: ticks in which a clutch, a brake or the grip jumps often are."""
+        self.coarse.count += count
 
     def told_of_loop(self):
         """Return ``{key: value}`` of what is driven, for diagnostics."""

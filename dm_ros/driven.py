@@ -182,10 +182,13 @@ class Driven:
         """Notice what is not noticed where it happens; to be called at 1 Hz."""
         coarse = self.simulation.coarse_steps
         if coarse > self._coarse_before:
-            self.coarse.happened('their work reached its bound', coarse - self._coarse_before)
+            self._notice_coarse(coarse - self._coarse_before)
         self._coarse_before = coarse
         if names := self.inputs.stale(self.simulation.ticks):
             self._notice_stale(names)
+
+    def _notice_coarse(self, count):
+        self.coarse.happened('their work reached its bound', count)
 
     def _notice_stale(self, names):
         self.stale.happened(', '.join(names))

@@ -241,8 +241,8 @@ BAD_TABLES = {
     "IN.csv:3: column 'rear_right_contact': ": 'time,rear_right_contact\n0,1\n0.1,-0.1\n1,1\n',
     "IN.csv:2: column 'centre_rear_clutch': -1.0 N is negative, a clutch can only be pressed":
         'time,centre_rear_clutch\n0,-1\n1,0\n',
-    "IN.csv:3: column 'steer': the angle on steer is 0.1, it must not be above 0, the car cannot "
-    'turn without --planar': 'time,steer\n0,0\n0.1,0.1\n1,0\n',
+    "IN.csv:3: column 'steer': the angle on steer is 0.1, it must not be above 0: the body "
+    'cannot turn unless it is planar (--planar)': 'time,steer\n0,0\n0.1,0.1\n1,0\n',
     "IN.csv:2: column 'grade': ": 'time,grade\n0,11\n1,0\n',
     "IN.csv:3: column 'time': 0.0 does not come after 0.0": GOOD.replace('0.05', '0'),
     "IN.csv:2: column 'time': -1.0 is negative": GOOD.replace('\n0,', '\n-1,'),

@@ -23,16 +23,18 @@ class Port(NamedTuple):
     idle: float | None = 0.0   # what holds while nothing comes in
     array: str = 'effort'      # of a JointState that brings it
     lasts: bool = False        # whether it holds however old it is
+    note: str = ''             # why not all is allowed
 
     def refusal(self, value):
         """Return why a value must not come in, in words, or None."""
         what = f'the {self.kind} on {self.name} is {value}'
         if not math.isfinite(value):
             return what
+        note = f': {self.note}' if self.note else ''
         if value < self.low:
-            return f'{what}, it must not be below {self.low:g}'
+            return f'{what}, it must not be below {self.low:g}{note}'
         if value > self.high:
-            return f'{what}, it must not be above {self.high:g}'
+            return f'{what}, it must not be above {self.high:g}{note}'
         return None
 
 

@@ -99,6 +99,9 @@ class HeldInputs:
         known = self._prefixed or self._index
         others = [name for name in names if name not in known] if array == 'effort' else ()
         plural = {'effort': 'efforts', 'velocity': 'velocities', 'position': 'positions'}[array]
+        if 'position' in self._arrays:
+            return (f'{len(names)} names but {len(values)} {plural}: each array needs one for '
+                    'each name, NaN where another array has its command, or none at all')
         return (f'{len(names)} names but {len(values)} {plural}: each name needs one, NaN for no '
                 f'command{", but leave out " * bool(others)}{", ".join(others)}; in ros2_control '
                 f'declare a command interface {array} for each joint of the system, and joints '

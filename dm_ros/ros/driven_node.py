@@ -111,9 +111,9 @@ class DrivenNode(Node):
         self.outputs.publish(self.simulation.snapshot())
 
     def is_connected(self):
-        """Return whether somebody commands and somebody hears the joint states."""
-        return (self.inputs.grouped.get_publisher_count() > 0
-                and self.outputs.joint_states.get_subscription_count() > 0)
+        """Return whether somebody commands and somebody hears what it reports."""
+        return self.inputs.grouped.get_publisher_count() > 0 and any(
+            publisher.get_subscription_count() > 0 for publisher, _ in self.outputs.of_a_tick)
 
     def set_pace(self):
         """Let the pacer follow the settings; the lock of ``control`` must be held."""

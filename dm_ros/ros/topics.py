@@ -81,7 +81,7 @@ class Outputs:
         qos = LOCKSTEP_OUTPUT_QOS if node.plant.lockstep else OUTPUT_QOS
         self.of_a_tick = [(node.publisher(type(message), f'~/{topic}', qos), message)
                           for topic, message in messages.of_a_tick.items()]
-        self.joint_states, self._joint_states = self.of_a_tick[0]
+        _, self._joint_states = self.of_a_tick[0]
         self.clock = node.publisher(Clock, '/clock', qos) if settings.publish_clock else None
         self._simulated_stamps = node.plant.lockstep or settings.publish_clock
 

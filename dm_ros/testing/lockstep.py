@@ -185,7 +185,8 @@ class LockstepDriven:
         while not (self.node.is_connected() and self._hears_all()):
             if time.monotonic() > end:
                 raise TimeoutError(f'nobody publishes on /{self.name}/{self.node.plant.grouped} '
-                                   f'and listens to /{self.name}/joint_states')
+                                   f'and listens to /{self.name}/joint_states, or to another '
+                                   'of its topics')
             self.executor.spin_once(timeout_sec=0.01)
 
     def _hears_all(self):

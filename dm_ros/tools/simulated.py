@@ -32,7 +32,7 @@ from dm_ros.tools.driveline_option import (
 from dm_ros.tools.passed_over import warn
 
 NO_BAG = 'no bag of a driveline is written or read; record the node driveline by ros2 bag'
-STEER = {'steer': ', the car cannot turn without --planar'}
+STEER = {'steer': ' (--planar)'}
 
 
 class Comparison:
