@@ -93,7 +93,7 @@ class Assembly:
         """
         Add a wheel with its brake and its tyre; return its flange.
 
-        :param x, y: of its contact before and to the left of the centre of mass, m.
+        :param x: of its contact before the centre of mass, m; y: to the left of it.
         :param is_front: whether it carries the front of the body, in equal parts with all others
             that do, or the rear.
         """

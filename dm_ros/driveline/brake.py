@@ -9,9 +9,9 @@ The state y is the deflection of the pads over ``pad``, in [-1, 1]; at rest it i
     dy/dt = (omega - alpha(y) |omega| y)/pad
     T = T_cap (y + c_b/(1 + (omega/w_low)^2) (1 - y^2) omega),    T_cap = brake + C_rr F_z R
 
-with alpha = 0 while omega y <= 0 or |y| < 0.7, then z^2 (3 - 2 z), z = (|y| - 0.7)/0.3, and 1 from
-|y| = 1. T brakes the wheel. It stores T_cap pad y^2/2 and loses T_cap alpha |omega| y^2 and the
-damping.
+with alpha = 0 while omega y <= 0 or abs(y) < 0.7, then z^2 (3 - 2 z), z = (abs(y) - 0.7)/0.3, and
+1 from abs(y) = 1. T brakes the wheel. It stores T_cap pad y^2/2, and loses the damping and
+T_cap alpha abs(omega) y^2.
 """
 
 ELASTIC = 0.7   # |y| up to which the pads only deflect

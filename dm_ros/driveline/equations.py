@@ -59,7 +59,7 @@ class Equations:
         Return the ``Point`` at a state.
 
         :param array: (n,); friction: of each differential; given: ``Given``.
-        :param train, road: its ``TrainPoint`` and its ``RoadPoint``, where they are known.
+        :param train: its ``TrainPoint``, where it is known; road: its ``RoadPoint``, likewise.
         """
         x = array.tolist()
         if train is None:

@@ -66,7 +66,7 @@ def contact(k, mu, F_z, kappa, alpha, U, V_x, V_y):
     Return the contact of one tyre with the road.
 
     :param U: R omega, m/s; V_x, V_y: velocity of the wheel centre in its frame, m/s.
-    :return: (F_x, F_y, dkappa/dt, dalpha/dt, V_sx, V_sy, |V_s|, V_r, p_x, p_y, rho, f, share,
+    :return: (F_x, F_y, dkappa/dt, dalpha/dt, V_sx, V_sy, V_s, V_r, p_x, p_y, rho, f, share,
         damping), with share = f/rho and the damping over mu F_z, s/m.
     """
     V_sx, V_sy = U - V_x, -V_y
