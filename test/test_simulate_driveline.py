@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 
-from drivelines import DIFFERENTIALS
+from driveline.scenarios import DIFFERENTIALS
 import numpy as np
 import pytest
 

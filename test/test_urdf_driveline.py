@@ -7,7 +7,8 @@ import io
 from pathlib import Path
 from xml.etree import ElementTree
 
-from drivelines import DIFFERENTIALS, example
+from driveline.scenarios import DIFFERENTIALS
+from drivelines import example
 import numpy as np
 import pytest
 from urdfs import check, Moving, touching, vector

@@ -103,3 +103,13 @@ SCENARIOS = {
         changes=in_order([(0.0, {'torque': 60.0})], sine_steer()),
         duration=4.5),
 }
+
+
+def split_grip_start(layout):
+    """Return a start on a hill of 8 % where each wheel has its own grip, a little to the left."""
+    return Scenario(
+        layout=layout, planar=True, speed=0.0, parameters=sign_speeds(layout),
+        changes=[(0.0, {'grade': 0.08, 'grip': (0.12, 0.9, 0.2, 1.0), 'brakes': (800.0,) * 4,
+                        'steer': 0.1}),
+                 (0.3, {'torque': 500.0}), (0.4, {'brakes': (0.0,) * 4})],
+        duration=0.8)

@@ -14,7 +14,7 @@ import os
 from pathlib import Path
 
 from driveline import yardstick
-from driveline.scenarios import DEFAULT_INPUTS, Scenario, SCENARIOS, sign_speeds, WHEELS
+from driveline.scenarios import DEFAULT_INPUTS, SCENARIOS, split_grip_start, WHEELS
 import numpy as np
 import pytest
 
@@ -25,7 +25,6 @@ else:
 
 PARTS = Path(__file__).with_name('driveline.mo').read_text()
 MODELS = {'awd': 'AllWheelDrive', 'fwd': 'FrontWheelDrive', 'rwd': 'RearWheelDrive'}
-SPLIT_GRIP = (0.12, 0.9, 0.2, 1.0)
 
 
 def held(changes, name, pick=lambda value: value):
@@ -114,14 +113,8 @@ def test_lane():
 
 @pytest.mark.parametrize('layout', MODELS)
 def test_a_start_on_a_hill_where_each_wheel_has_its_own_grip(layout):
-    scenario = Scenario(
-        layout=layout, planar=True, speed=0.0, parameters=sign_speeds(layout),
-        changes=[(0.0, {'grade': 0.08, 'grip': SPLIT_GRIP, 'brakes': (800.0,) * 4,
-                        'steer': 0.1}),
-                 (0.3, {'torque': 500.0}), (0.4, {'brakes': (0.0,) * 4})],
-        duration=0.8)
-    car = yardstick.Car(layout, True, scenario.parameters)
-    run = yardstick.integrate(car, car.rolling(0.0, 0.08), scenario.changes, scenario.duration)
+    scenario = split_grip_start(layout)
+    run = yardstick.run_of(scenario)
     result = simulate(scenario)
     names = {'v_x': 'vx', 'v_y': 'vy', 'r': 'r', 'A_x': 'Ax', 'A_y': 'Ay', 'input': 'engine.w'}
     for i, wheel in enumerate(WHEELS):

@@ -8,12 +8,10 @@ The yardstick itself stands beside a Modelica compiler in ``test_against_modelic
 """
 
 from driveline import yardstick
-from driveline.scenarios import DEFAULT_INPUTS, SCENARIOS, sign_speeds, WHEELS
-from drivelines import random_given, random_state, System
+from driveline.scenarios import DEFAULT_INPUTS, sign_speeds, split_grip_start, WHEELS
+from drivelines import random_given, random_state, run_of, System
 import numpy as np
 import pytest
-
-from dm_ros import Driveline
 
 LAYOUTS = [(layout, planar) for layout in ('awd', 'fwd', 'rwd') for planar in (False, True)]
 CLUTCHED = {'driveline.rear.clutch.left.friction_surfaces': 6,
@@ -21,7 +19,6 @@ CLUTCHED = {'driveline.rear.clutch.left.friction_surfaces': 6,
             'driveline.rear.clutch.left.preload': 30.0,
             'driveline.rear.clutch.right.coast_factor': 0.5}
 GAPS = {'driveline.shaft.half.gap': 0.02, 'driveline.shaft.rear_propeller.gap': 0.015}
-SPLIT_GRIP = (0.12, 0.9, 0.2, 1.0)
 
 
 def name_there(name):
@@ -62,34 +59,10 @@ def test_the_rates_of_all_states_are_those_of_the_yardstick(layout, planar, para
             assert rate == pytest.approx(there[name], rel=1e-8, abs=1e-7), (n, name)
 
 
-def run_of(scenario):
-    """Return what the product makes of a scenario at 1 kHz, by the names of the yardstick."""
-    car = Driveline(scenario.layout, scenario.planar, 0.001, scenario.parameters)
-    inputs, changes = dict(DEFAULT_INPUTS), dict(scenario.changes)
-    car.reset(scenario.speed, {**inputs, **scenario.changes[0][1]}['grade'])
-    snapshots = [car.snapshot()]
-    for n in range(round(scenario.duration * 1000)):
-        inputs |= changes.get(round(n / 1000, 9), {})
-        snapshots.append(car.step(**inputs))
-    return car, snapshots
-
-
-def split_start(layout):
-    scenario = SCENARIOS['hill_axle_ice']
-    return scenario._replace(
-        layout=layout, planar=True, parameters=sign_speeds(layout), duration=0.8,
-        changes=[(0.0, {'grade': 0.08, 'grip': SPLIT_GRIP, 'brakes': (800.0,) * 4,
-                        'steer': 0.1}),
-                 (0.3, {'torque': 500.0}), (0.4, {'brakes': (0.0,) * 4})])
-
-
 @pytest.mark.parametrize('layout', ['awd', 'fwd', 'rwd'])
 def test_a_split_grip_start_on_a_hill_is_that_of_the_yardstick(layout):
-    scenario = split_start(layout)
-    there = yardstick.Car(layout, True, scenario.parameters)
-    run = yardstick.integrate(there, there.rolling(0.0, 0.08), scenario.changes,
-                              scenario.duration)
-    car, snapshots = run_of(scenario)
+    scenario = split_grip_start(layout)
+    run, (car, snapshots) = yardstick.run_of(scenario), run_of(scenario)
     assert len(snapshots) == len(run.times)
 
     def series(of):
@@ -105,7 +78,7 @@ def test_a_split_grip_start_on_a_hill_is_that_of_the_yardstick(layout):
         here = series(lambda snapshot, n=n: snapshot.slip[n][0])
         assert np.abs(here - run.states[f'{wheel}.kappa']).max() < 5e-3, wheel
     # how the torque is split, at the end
-    _, look = there.evaluate(run.state(-1), run.inputs[-1])
+    _, look = run.car.evaluate(run.state(-1), run.inputs[-1])
     torques = dict(zip(car.connections, snapshots[-1].torque))
     for name, torque in look['torques'].items():
         assert torques[name] == pytest.approx(torque, rel=2e-3, abs=0.5), name

@@ -5,7 +5,8 @@
 
 import math
 
-from drivelines import DIFFERENTIALS, drive, NONE
+from driveline.scenarios import DIFFERENTIALS
+from drivelines import drive, NONE
 import numpy as np
 import pytest
 

@@ -3,7 +3,8 @@
 
 """The equations of the driveline: numbers, identities, and the Jacobian."""
 
-from drivelines import example, GAPS, random_given, random_state, sign_speed, System
+from driveline.scenarios import sign_speeds
+from drivelines import example, GAPS, random_given, random_state, System
 import numpy as np
 import pytest
 
@@ -27,7 +28,7 @@ def near(numbers, relative=1e-9):
 
 @pytest.fixture(scope='module')
 def system():
-    return System(parameters=sign_speed('awd'), given=GIVEN, forces={'centre': (0.0, 500.0)})
+    return System(parameters=sign_speeds('awd'), given=GIVEN, forces={'centre': (0.0, 500.0)})
 
 
 def test_the_states_are_as_many_as_the_design_has():

@@ -432,14 +432,18 @@ def integrate(car, state, changes, duration, rtol=1e-8, atol=1e-10, method='Rada
     return Run(car, np.array(times), dict(zip(names, np.array(rows).T)), in_force, pieces, count)
 
 
-@cache
-def run(name, **tolerances):
-    """Return the ``Run`` of one of the scenarios."""
-    scenario = SCENARIOS[name]
+def run_of(scenario, **tolerances):
+    """Return the ``Run`` of a ``Scenario``."""
     car = Car(scenario.layout, scenario.planar, scenario.parameters)
     first = {**DEFAULT_INPUTS, **scenario.changes[0][1]}
     return integrate(car, car.rolling(scenario.speed, first['grade']), scenario.changes,
                      scenario.duration, **tolerances)
+
+
+@cache
+def run(name, **tolerances):
+    """Return the ``Run`` of one of the scenarios, by its name."""
+    return run_of(SCENARIOS[name], **tolerances)
 
 
 def books(run):
