@@ -70,11 +70,7 @@ int dm_advance(step *job, pair y)
             here = there;
             there = &job->points[here == &job->points[0]];
         }
-        double scale = error > 1e-3 ? SAFETY * pow(error, -1.0 / 3) : GROW;
-        scale = scale > SHRINK ? scale : SHRINK;
-        h *= scale < GROW ? scale : GROW;
-        if (h > 0.999 * left)
-            h = left;
+        h = next_part(h, error, left);
     }
     h = left;
     for (int n = 0; n < MOST_RESORTS; n++) {

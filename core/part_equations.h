@@ -8,6 +8,15 @@
 
 static const double BACKWARD = 3.0, SAFETY = 0.8, SHRINK = 0.1, GROW = 5.0;
 
+/* Return the length of the next part after one of length h with an error over the allowed. */
+static double next_part(double h, double error, double left)
+{
+    double scale = error > 1e-3 ? SAFETY * pow(error, -1.0 / 3) : GROW;
+    scale = scale > SHRINK ? scale : SHRINK;
+    h *= scale < GROW ? scale : GROW;
+    return h > 0.999 * left ? left : h;
+}
+
 /* Return h (3 I - |h| J)^-1 (f(there) - f(here) - J d) of two points that are d apart. */
 static OF(pair) nonlinear_part(OF(step) *job, const OF(point) *here, const OF(point) *there,
                                OF(matrix) J, REAL h, REAL d_w, REAL d_s)

@@ -15,8 +15,6 @@ from dm_ros.mechanism.parameters import row
 from dm_ros.settings import LoopParameters
 
 FRAME = r'[A-Za-z][A-Za-z0-9_/.-]*', 'a letter and then letters, digits and any of _ / . -'
-TOPICS = {'torque': 'torque/{}', 'capacity': 'brake/{}', 'force': 'clutch/{}', 'angle': '{}',
-          'tangent': '{}'}     # of single ports, by their kind; others follow their names
 
 
 @dataclass(frozen=True)
@@ -105,17 +103,10 @@ def step_arguments(car):
     return arguments
 
 
-def topics_of(ports):
-    """Return ``{topic: port name}`` of the topics of single ports, below ~."""
-    topics = {}
-    for port in ports:
-        element, _, what = port.name.rpartition('_')
-        if port.kind in TOPICS:
-            element = element if port.kind in ('capacity', 'force') else port.name
-            topics[TOPICS[port.kind].format(element)] = port.name
-        else:
-            topics[f'{what}/{element}'] = port.name
-    return topics
+def port_limits(car, settings):
+    """Return ``{port: most}`` of those of ``node_ports`` beyond which a demand is clamped."""
+    return {**{port.name: settings.torque_limit for port in car.ports if port.unit == 'N m'},
+            **dict(zip([f'{clutch}_clutch' for clutch in car.clutches], car.force_limits))}
 
 
 class PreparedDriveline(NamedTuple):
@@ -145,7 +136,7 @@ class DrivelinePlant(Driven):
         settings = DrivelineNodeParameters().changed(DrivelineNodeParameters.part_of(values))
         car = make_driveline(values)
         ports = node_ports(car)
-        super().__init__(settings, car, ports, topics_of(ports), log)
+        super().__init__(settings, car, ports, {port.topic: port.name for port in ports}, log)
         self._arguments = step_arguments(car)
         self.reset()
         self.adopt(PreparedDriveline(settings, None))
@@ -203,11 +194,8 @@ class DrivelinePlant(Driven):
         if prepared.car:
             prepared.car.follow(self.simulation)
             self.simulation = prepared.car
-        limits = {'torque': self.settings.torque_limit, 'capacity': self.settings.torque_limit}
-        forces = dict(zip((f'{clutch}_clutch' for clutch in self.simulation.clutches),
-                          self.simulation.force_limits))
-        self.limit(tuple([forces.get(port.name, limits.get(port.kind, math.inf))
-                          for port in self.inputs.ports]))
+        limits = port_limits(self.simulation, self.settings)
+        self.limit(tuple([limits.get(port.name, math.inf) for port in self.inputs.ports]))
 
     def _notice_coarse(self, count):
         """Count them alone: ticks in which a clutch, a brake or the grip jumps often are."""

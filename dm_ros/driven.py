@@ -69,7 +69,12 @@ class Driven:
     """
     A simulation as a node runs it, whatever it is of.
 
-    :param settings: ``LoopParameters``; simulation: has ``ticks``, ``snapshot`` and ``reset``.
+    A subclass has ``values`` and ``rows``, all parameters by full name and what is known of them;
+    ``prepared`` and ``adopt``, which change some of them; ``title`` and ``words`` for the log; and
+    ``_step``, which makes a tick under what is held for each port.
+
+    :param settings: ``LoopParameters``; simulation: has ``ticks``, ``dt``, ``time``, ``language``,
+        ``coarse_steps``, ``snapshot`` and ``reset``.
     :param ports: the ``Port`` s that it takes, in its order.
     :param single_topics: ``{topic: port name}`` of the topics of single ports, below ~.
     :param log: has ``warning`` and ``info``; conditions are logged there.
@@ -94,21 +99,6 @@ class Driven:
     def lockstep(self):
         """Whether each demand brings its own tick."""
         return self.settings.mode == 'lockstep'
-
-    @property
-    def _tables(self):
-        """All tables of parameters, its own and those of what it drives."""
-        raise NotImplementedError
-
-    @property
-    def values(self):
-        """``{full name: value}`` of all parameters, its own and those of what it drives."""
-        return {name: value for table in self._tables for name, value in table.named().items()}
-
-    @property
-    def rows(self):
-        """``{full name: Row}`` of all parameters."""
-        return {name: row for table in self._tables for name, row in table.rows().values()}
 
     def take(self, names, values, what, stamp=0, sparse=False):
         """
@@ -147,10 +137,6 @@ class Driven:
         except ValueError as error:
             self.out_of_range.happened(str(error))
             return self.simulation.snapshot()
-
-    def _step(self, held):
-        """Advance the simulation under what is held; raise ValueError where it cannot be."""
-        raise NotImplementedError
 
     def reset(self):
         """Go back to the start, without any demand; parameters stay."""

@@ -65,6 +65,16 @@ class Plant(Driven):
                 *(f'{kind} on {", ".join(names)}' for kind, names in inputs.items() if names)]
 
     @property
+    def values(self):
+        """``{full name: value}`` of all parameters, its own and those of its mechanism."""
+        return {name: value for table in self._tables for name, value in table.named().items()}
+
+    @property
+    def rows(self):
+        """``{full name: Row}`` of all parameters."""
+        return {name: row for table in self._tables for name, row in table.rows().values()}
+
+    @property
     def _tables(self):
         return self.settings, self.simulation.parameters, *self.ports.values()
 

@@ -9,8 +9,8 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
+from interrupting import check_interrupt
 import numpy as np
 import pytest
 
@@ -483,23 +483,7 @@ def test_a_link_stays_a_link(folder):
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_nothing_behind(folder, number):
     (folder / 'IN.csv').write_text(GOOD.replace('\n1,', '\n5e3,'))
-    (folder / 'OUT.csv').write_text('precious')
-    before = set(folder.iterdir())
-    process = subprocess.Popen(   # a shell's background job, as a test run may be, ignores SIGINT
-        [*TOOL, '--torques', 'IN.csv', '--out', 'OUT.csv'], stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
-    try:
-        end = time.monotonic() + 60.0
-        while not any(path.suffix == '.part' for path in folder.iterdir()):
-            assert time.monotonic() < end and process.poll() is None
-            time.sleep(0.01)
-        process.send_signal(number)
-        _, err = process.communicate(timeout=60.0)
-    finally:
-        process.kill()
-    assert process.returncode == 128 + number and not err
-    assert set(folder.iterdir()) == before
-    assert (folder / 'OUT.csv').read_text() == 'precious'
+    check_interrupt(number, folder, *TOOL, '--torques', 'IN.csv')
 
 
 def test_a_reader_that_leaves_ends_it_quietly(folder):

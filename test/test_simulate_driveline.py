@@ -9,9 +9,9 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
-import time
 
 from driveline.scenarios import DIFFERENTIALS
+from interrupting import check_interrupt
 import numpy as np
 import pytest
 
@@ -381,28 +381,10 @@ def test_without_a_file_the_csv_goes_to_stdout(folder, capfd):
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_leaves_nothing_behind(folder, monkeypatch, number):
-    # the tool as a process finds the package where this one does
-    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(path or os.getcwd() for path in sys.path))
+def test_an_interrupted_run_leaves_nothing_behind(folder, number):
     (folder / 'IN.csv').write_text(GOOD.replace('\n0.1,', '\n5e3,'))
-    (folder / 'OUT.csv').write_text('precious')
-    before = set(folder.iterdir())
-    process = subprocess.Popen(   # a shell's background job, as a test run may be, ignores SIGINT
-        [sys.executable, '-m', 'dm_ros.tools.simulate', '--driveline', 'awd', '--torques',
-         'IN.csv', '--out', 'OUT.csv'], stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
-    try:
-        end = time.monotonic() + 60.0
-        while not any(path.suffix == '.part' for path in folder.iterdir()):
-            assert time.monotonic() < end and process.poll() is None
-            time.sleep(0.01)
-        process.send_signal(number)
-        _, err = process.communicate(timeout=60.0)
-    finally:
-        process.kill()
-    assert process.returncode == 128 + number and not err
-    assert set(folder.iterdir()) == before
-    assert (folder / 'OUT.csv').read_text() == 'precious'
+    check_interrupt(number, folder, sys.executable, '-m', 'dm_ros.tools.simulate', '--driveline',
+                    'awd', '--torques', 'IN.csv')
 
 
 def test_the_tool_loads_neither_ros_nor_matplotlib(monkeypatch):

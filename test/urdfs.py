@@ -3,7 +3,11 @@
 
 """What the tests of URDFs share: whether one is valid, how its links move, where gears touch."""
 
+import io
+from xml.etree import ElementTree
+
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from dm_ros.files.urdf import ALONG
@@ -91,3 +95,19 @@ def check(robot):
     for shape in robot.iterfind('.//geometry/*'):
         for name in shape.attrib:
             assert all(0 < size < np.inf for size in vector(shape, name)), shape.attrib
+
+
+def in_yourdfpy(text):
+    """Return a URDF as yourdfpy loads it, once it has shown that its links are where ours are."""
+    yourdfpy = pytest.importorskip('yourdfpy')
+    robot = yourdfpy.URDF.load(io.BytesIO(text.encode()))
+    assert robot.validate() and not robot.errors
+    rng = np.random.default_rng(5)
+    position = {name: rng.uniform(-9, 9) for name in robot.actuated_joint_names}
+    robot.update_cfg(position)
+    moving = Moving(ElementTree.fromstring(text), position, dict.fromkeys(position, 0.0))
+    for link, (rotation, place, *_) in moving.links.items():
+        transform = robot.get_transform(link)
+        assert transform[:3, :3] == pytest.approx(rotation.as_matrix(), abs=1e-12)
+        assert transform[:3, 3] == pytest.approx(place, abs=1e-12)
+    return robot

@@ -152,15 +152,6 @@ static void blend(MASK which, const OF(point) *from, OF(point) *into)
     put(which, sizeof *from / sizeof(REAL), (const REAL *)from, (REAL *)into);
 }
 
-/* The length of the next part, of one member; as in dm_advance. */
-static double next_part(double h, double error, double left)
-{
-    double scale = error > 1e-3 ? SAFETY * pow(error, -1.0 / 3) : GROW;
-    scale = scale > SHRINK ? scale : SHRINK;
-    h *= scale < GROW ? scale : GROW;
-    return h > 0.999 * left ? left : h;
-}
-
 /* Advance those that are watched from the point here, as dm_advance; points are there for use. */
 static const OF(point) *advance(OF(step) *job, OF(pair) y, OF(point) *here, OF(point) *points,
                                 OF(pair) *end, OF(pair) *integral)

@@ -15,7 +15,7 @@ STEEPEST = 10.0        # tangent of a slope
 STEER_LIMIT = 1.0      # rad
 TURNING_POINT = 0.9    # of the way from a steered wheel to the centre of its circle, at least left
 LEAST_GRIP = 1e-6
-ON_THE_ROAD = {'array': 'position', 'lasts': True}   # a car whose brakes let go is no safe state
+OF_A_ROAD = {'array': 'position', 'lasts': True}
 
 
 class Inputs:
@@ -32,16 +32,18 @@ class Inputs:
         self.clutches = tuple([c for d in differentials for c in d.clutches])
         steer = min(STEER_LIMIT, atan(2.0 * TURNING_POINT * p.L / p.track)) if planar else inf
         groups = {
-            'torque': (torque(INPUT),),
-            'brakes': [Port(f'{wheel}_brake', 'capacity', 'N m', 0.0, lasts=True)
-                       for wheel in wheels],
-            'clutch_forces': [force(f'{clutch}_clutch') for clutch in self.clutches],
-            'steer': (Port('steer', 'angle', 'rad', -steer, steer, **ON_THE_ROAD),),
-            'grade': (Port('grade', 'tangent', '1', -STEEPEST, STEEPEST, **ON_THE_ROAD),),
-            'grip': [Port(f'{wheel}_grip', 'share', '1', LEAST_GRIP, idle=1.0, **ON_THE_ROAD)
-                     for wheel in wheels],
-            'contact': [Port(f'{wheel}_contact', 'share', '1', 0.0, idle=1.0, **ON_THE_ROAD)
-                        for wheel in wheels],
+            'torque': (torque(INPUT)._replace(topic=f'torque/{INPUT}'),),
+            'brakes': [Port(f'{wheel}_brake', 'capacity', 'N m', 0.0, lasts=True,
+                            topic=f'brake/{wheel}') for wheel in wheels],
+            'clutch_forces': [force(f'{clutch}_clutch')._replace(topic=f'clutch/{clutch}')
+                              for clutch in self.clutches],
+            'steer': (Port('steer', 'angle', 'rad', -steer, steer, topic='steer', **OF_A_ROAD),),
+            'grade': (Port('grade', 'tangent', '1', -STEEPEST, STEEPEST, topic='grade',
+                           **OF_A_ROAD),),
+            'grip': [Port(f'{wheel}_grip', 'share', '1', LEAST_GRIP, idle=1.0,
+                          topic=f'grip/{wheel}', **OF_A_ROAD) for wheel in wheels],
+            'contact': [Port(f'{wheel}_contact', 'share', '1', 0.0, idle=1.0,
+                             topic=f'contact/{wheel}', **OF_A_ROAD) for wheel in wheels],
             'wind': (Port('wind', 'head wind', 'm/s', -inf),)}
         self.ports = tuple([port for group in groups.values() for port in group])
         self._arguments = [name for name, group in groups.items() for _ in group]

@@ -5,8 +5,7 @@
 
 import numpy as np
 
-from dm_ros.files.columns import write_csv
-from dm_ros.files.output import replacing
+from dm_ros.files.record import Table
 
 BODY = ('x', 'y', 'yaw', 'longitudinal_speed', 'lateral_speed', 'yaw_rate',
         'longitudinal_acceleration', 'lateral_acceleration')
@@ -33,7 +32,7 @@ def driveline_row(snapshot, forces):
             *snapshot.pose, *snapshot.twist_body, *snapshot.acceleration)
 
 
-class DrivelineRecord:
+class DrivelineRecord(Table):
     """
     What a driveline reported in a run, as numpy arrays over the ticks.
 
@@ -48,29 +47,12 @@ class DrivelineRecord:
     """
 
     def __init__(self, car, rows, title=''):
-        self.title = title
-        names = driveline_columns(car)
-        self._table = np.asarray(rows, float).reshape(-1, len(names))
-        self.columns = dict(zip(names, self._table.T))
-        self.time = self.columns['time']
+        super().__init__(driveline_columns(car), rows, title)
         for name in BODY:
             setattr(self, name, self.columns[name])
         for kind, of in OF_NAMES.items():
             setattr(self, kind, {name: self.columns[f'{kind}.{name}']
                                  for name in getattr(car, of)})
-
-    def __len__(self):
-        return len(self.time)
-
-    def save_csv(self, path):
-        """Write the record as CSV, a row a tick, 17 significant digits."""
-        with replacing(path, 'w') as file:
-            write_csv(file, self.columns, map(tuple, self._table.tolist()))
-
-    def save_plot(self, path):
-        """Draw the record as PNG, which needs matplotlib."""
-        with replacing(path, 'wb') as file:
-            self.draw(file)
 
     def draw(self, file):
         """Draw the record as PNG into a binary file: body, wheels, tyres, torques."""

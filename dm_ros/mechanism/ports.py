@@ -24,6 +24,7 @@ class Port(NamedTuple):
     array: str = 'effort'      # of a JointState that brings it
     lasts: bool = False        # whether it holds however old it is
     note: str = ''             # why not all is allowed
+    topic: str = ''            # that brings it alone, below the name of a node
 
     def refusal(self, value):
         """Return why a value must not come in, in words, or None."""

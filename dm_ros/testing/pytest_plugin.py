@@ -44,55 +44,39 @@ def pytest_runtest_makereport(item, call):
 @pytest.fixture
 def differential(request):
     """Return a function that starts a ``LockstepDifferential``; its arguments are those."""
-    from dm_ros.testing.lockstep import LockstepDifferential
-    with ExitStack() as stack:
-        made = []
-
-        def make(variant='symmetric_ode', rate=1000.0, parameters=None):
-            made.append(stack.enter_context(LockstepDifferential(variant, rate, parameters)))
-            return made[-1]
-        yield make
-        leave_records(request, made)
+    yield from makers(request, 'LockstepDifferential')
 
 
 @pytest.fixture
 def direct_differential(request):
     """Return a function that makes a ``DirectDifferential``; its arguments are those."""
-    from dm_ros.testing.direct import DirectDifferential
-    made = []
-
-    def make(variant='symmetric_ode', rate=1000.0, **options):
-        made.append(DirectDifferential(variant, rate, **options))
-        return made[-1]
-    yield make
-    leave_records(request, made)
+    yield from makers(request, 'DirectDifferential')
 
 
 @pytest.fixture
 def driveline(request):
     """Return a function that starts a ``LockstepDriveline``; its arguments are those."""
-    from dm_ros.testing.lockstep import LockstepDriveline
-    with ExitStack() as stack:
-        made = []
-
-        def make(layout='awd', planar=False, rate=1000.0, parameters=None):
-            made.append(stack.enter_context(LockstepDriveline(layout, planar, rate, parameters)))
-            return made[-1]
-        yield make
-        leave_records(request, made)
+    yield from makers(request, 'LockstepDriveline')
 
 
 @pytest.fixture
 def direct_driveline(request):
     """Return a function that makes a ``DirectDriveline``; its arguments are those."""
-    from dm_ros.testing.direct import DirectDriveline
-    made = []
+    yield from makers(request, 'DirectDriveline')
 
-    def make(layout='awd', rate=1000.0, **options):
-        made.append(DirectDriveline(layout, rate, **options))
-        return made[-1]
-    yield make
-    leave_records(request, made)
+
+def makers(request, name):
+    """Yield a function that makes what has a name in ``dm_ros.testing``; then end all of it."""
+    from dm_ros import testing
+    with ExitStack() as stack:
+        made = []
+
+        def make(*arguments, **options):
+            one = getattr(testing, name)(*arguments, **options)
+            made.append(stack.enter_context(one) if hasattr(one, '__exit__') else one)
+            return made[-1]
+        yield make
+        leave_records(request, made)
 
 
 def leave_records(request, differentials):

@@ -7,21 +7,29 @@ from math import hypot
 
 from dm_ros.driveline.body import G
 from dm_ros.driveline.parameters import VehicleParameters
-from dm_ros.driveline_plant import DrivelineNodeParameters, make_driveline, node_ports
+from dm_ros.driveline_plant import (
+    DrivelineNodeParameters,
+    make_driveline,
+    node_ports,
+    port_limits,
+)
 from dm_ros.files.published_driveline import PublishedDriveline
 from dm_ros.watch.wheels import Wheels
 
 STEERED = 2                # of the wheels: the front ones come first
-# (input shaft, {output shaft: shaft that it drives}) of each differential
-FLANGES = {
-    'centre': ('centre_carrier', {'centre_front': 'front_axle_pinion',
-                                  'centre_rear': 'rear_axle_pinion'}),
-    **{axle: (f'{axle}_axle_pinion', {f'{axle}_axle_{side}': f'{axle}_{side}'
-                                      for side in ('left', 'right')})
-       for axle in ('front', 'rear')}}
 REACH = {'torque': 600.0, 'capacity': 2000.0, 'force': 5000.0, 'angle': 0.5, 'tangent': 0.3,
          'share': 1.2}     # of a slider, in the unit of its port
 MOST_SHARE = 10.0          # that is taken of a grip or a contact
+
+
+def flanges(car):
+    """Return ``{differential: (input shaft, {output shaft: shaft that it drives})}``."""
+    driven = dict(car.ends.values())
+    found = {}
+    for name, differential in car.mechanisms.items():
+        into, *outputs = differential.shaft_of.values()
+        found[name] = into, {output: driven[output] for output in outputs}
+    return found
 
 
 def control_ports(ports, limits):
@@ -51,10 +59,7 @@ class CarScene:
             DrivelineNodeParameters.part_of(values))
         car = make_driveline(values)
         self.inputs = node_ports(car)
-        limits = {**dict(zip([f'{clutch}_clutch' for clutch in car.clutches], car.force_limits)),
-                  **{port.name: node.torque_limit for port in self.inputs
-                     if port.kind in ('torque', 'capacity')}}
-        self.ports = control_ports(self.inputs, limits)
+        self.ports = control_ports(self.inputs, port_limits(car, node))
         published = PublishedDriveline(car, node.joint_prefix, node.base_frame_id)
         self.names = {topic: published.names[topic] for topic in ('joint_states', 'tyres')}
         self.frame = published.frame
@@ -63,7 +68,7 @@ class CarScene:
         self.flows = {f'power_flow/{name}': n for n, name in enumerate(car.differentials)}
         self._flow = [None] * len(self.flows)
         p = VehicleParameters().changed(VehicleParameters.part_of(values))
-        places = [(x, y) for x in (p.a, -p.b) for y in (p.track / 2.0, -p.track / 2.0)]
+        places = list(car.wheel_places.values())
         self._wheels = Wheels(p, places, STEERED if node.planar else 0)
         self._lay_out(car)
         self.description = {
@@ -72,9 +77,8 @@ class CarScene:
             'grouped': self.grouped, 'wheels': car.wheels, 'places': places, 'radius': p.R,
             'track': p.track, 'front': p.a, 'rear': p.b, 'weight': p.m * G,
             'connections': car.connections,
-            'differentials': [{'name': differential, 'input': FLANGES[differential][0],
-                               'outputs': list(FLANGES[differential][1])}
-                              for differential in car.differentials],
+            'differentials': [{'name': name, 'input': into, 'outputs': list(outputs)}
+                              for name, (into, outputs) in flanges(car).items()],
             'strips': [{'name': name, 'unit': unit, 'series': series}
                        for name, unit, series in self._strips(car)],
             'ports': self.ports}
@@ -83,14 +87,12 @@ class CarScene:
         """Note where in the joint states the numbers are that are told."""
         at = car.shafts.index
         self._of_wheels = [at(wheel) for wheel in car.wheels]
-        driven = {connection: shaft for shaft, connection in car.driven_by.items()}
-        self._driven = [at(driven[connection]) for connection in car.connections]
+        self._driven = [at(b) for _, b in car.ends.values()]
         # of each differential: (torque and speed of the input), then of the outputs
-        self._flanges = []
-        for differential in car.differentials:
-            shaft, outputs = FLANGES[differential]
-            self._flanges.append([(at(shaft), at(shaft)), *[
-                (at(driven), at(output)) for output, driven in outputs.items()]])
+        self._flanges = [
+            [(at(into), at(into)), *[(at(driven), at(output)) for output, driven
+                                     in outputs.items()]]
+            for into, outputs in flanges(car).values()]
 
     def _strips(self, car):
         """Return name, unit and series of each strip."""

@@ -34,9 +34,15 @@ class Simulator:
         self.ros.until(done)
 
 
+@pytest.fixture(params=['differential', 'driveline'])
+def start(ros, request):
+    """Return what starts a node of either kind."""
+    return getattr(ros, request.param)
+
+
 @pytest.fixture
-def follower(ros):
-    node = ros.differential(rate=100.0, use_sim_time=True)
+def follower(ros, start):
+    node = start(rate=100.0, use_sim_time=True)
     return node, Simulator(ros)
 
 
@@ -78,7 +84,7 @@ def test_a_clock_that_jumps_an_hour_ahead_is_not_caught_up_with(follower):
 
 def test_stamps_are_those_of_the_followed_clock(ros, follower):
     node, simulator = follower
-    joints = ros.listen(JointState, '/differential/joint_states')
+    joints = ros.listen(JointState, f'/{node.get_name()}/joint_states')
     simulator.show(7 * 10**9, node, 0)
     simulator.show(7 * 10**9 + 20_000_000, node, 2)
     ros.until(lambda: len(joints) == 2)
@@ -87,9 +93,9 @@ def test_stamps_are_those_of_the_followed_clock(ros, follower):
         Time(sec=7, nanosec=10_000_000), Time(sec=7, nanosec=20_000_000)]
 
 
-def test_it_cannot_follow_and_drive_the_clock_at_once(ros):
+def test_it_cannot_follow_and_drive_the_clock_at_once(start):
     with pytest.raises(ValueError, match='publish_clock'):
-        ros.differential(use_sim_time=True, publish_clock=True)
+        start(use_sim_time=True, publish_clock=True)
 
 
 def test_without_a_clock_it_says_that_it_waits_and_for_whom(ros, capfd):
@@ -140,13 +146,14 @@ def test_two_publishers_of_the_clock_are_named_until_one_goes(ros, capfd, parame
 
 def test_a_clock_that_goes_back_is_told_with_the_times(ros, follower, capfd):
     node, simulator = follower
+    name = f'/{node.get_name()}'
     diagnostics = ros.listen(DiagnosticArray, '/diagnostics')
     simulator.show(50 * 10**9, node, 0)
     simulator.show(2 * 10**9 + 1_000_000, node, 0)
-    ros.until(lambda: any(told([report], 'loop')[:2] == (DiagnosticStatus.WARN, '/clock goes back')
-                          for report in diagnostics))
+    ros.until(lambda: any(told([report], 'loop', name)[:2] == (
+        DiagnosticStatus.WARN, '/clock goes back') for report in diagnostics))
     assert '/clock goes back: from 50.000 s to 2.001 s\n' in capfd.readouterr().err
-    ros.until(lambda: told(diagnostics, 'loop')[:2] == (DiagnosticStatus.OK, 'running'))
+    ros.until(lambda: told(diagnostics, 'loop', name)[:2] == (DiagnosticStatus.OK, 'running'))
 
 
 @pytest.mark.parametrize('mode', ['realtime', 'lockstep'])
@@ -168,14 +175,15 @@ def test_use_sim_time_is_refused_while_it_runs_with_the_reason(ros, follows, mod
     assert node.plant.settings.torque_limit == 7.0
 
 
-def test_a_driven_clock_goes_with_the_ticks_in_real_time_and_paused(ros, steady):
-    node = ros.differential(rate=200.0, publish_clock=True)
-    joints = ros.listen(JointState, '/differential/joint_states')
+def test_a_driven_clock_goes_with_the_ticks_in_real_time_and_paused(ros, start, steady):
+    node = start(rate=200.0, publish_clock=True)
+    name = node.get_name()
+    joints = ros.listen(JointState, f'/{name}/joint_states')
     clock = ros.listen(Clock, '/clock')
     for _ in range(10):
         steady.tick(node, joints, clock)
-    ros.call(SetBool, '/differential/pause', data=True)
-    assert ros.call(Trigger, '/differential/step').success
+    ros.call(SetBool, f'/{name}/pause', data=True)
+    assert ros.call(Trigger, f'/{name}/step').success
     ros.until(lambda: len(joints) == len(clock) == 11)
     assert [m.clock.sec * 10**9 + m.clock.nanosec for m in clock] == [
         n * 5_000_000 for n in range(1, 12)]

@@ -6,7 +6,7 @@
 // In the car x points forward and y to the left, m; on the canvas that is up and left.
 
 import {blend, Colours} from './colours.js';
-import {scaleFor} from './drawing.js';
+import {chevron, scaleFor} from './drawing.js';
 import {fixed} from './words.js';
 
 const LAG = 0.07;               // s, of each of two lags that make steps even
@@ -224,21 +224,7 @@ export class CarDrawing {
     context.strokeStyle = colours.css(colours.paper);
     const long = Math.hypot(x1 - x0, y1 - y0), count = Math.max(1, Math.round(long / BETWEEN));
     for (let n = 0; n < count; n++) {
-      const along = (n + 1.6 * this.flow) / count % 1;
-      context.save();
-      context.translate(x0 + along * (x1 - x0), y0 + along * (y1 - y0));
-      context.rotate(Math.atan2(y1 - y0, x1 - x0));
-      context.globalAlpha = Math.min(1, 5 * Math.min(along, 1 - along));
-      context.lineWidth = 1.2;
-      context.beginPath();
-      context.moveTo(size, 0);
-      context.lineTo(-0.6 * size, 0.8 * size);
-      context.lineTo(-0.2 * size, 0);
-      context.lineTo(-0.6 * size, -0.8 * size);
-      context.closePath();
-      context.stroke();
-      context.fill();
-      context.restore();
+      chevron(context, [x0, y0], [x1, y1], (n + 1.6 * this.flow) / count % 1, size);
     }
   }
 

@@ -24,6 +24,24 @@ export function scaleFor(speed) {
   return SCALES.map(s => s * decade).find(s => s <= wanted * 1.0001);
 }
 
+// One of the chevrons that go along a way, at a share of it; in the colours of the context.
+export function chevron(context, [x0, y0], [x1, y1], along, size) {
+  context.save();
+  context.translate(x0 + along * (x1 - x0), y0 + along * (y1 - y0));
+  context.rotate(Math.atan2(y1 - y0, x1 - x0));
+  context.globalAlpha = Math.min(1, 5 * Math.min(along, 1 - along));
+  context.lineWidth = 1.5;
+  context.beginPath();
+  context.moveTo(size, 0);
+  context.lineTo(-0.7 * size, 0.85 * size);
+  context.lineTo(-0.25 * size, 0);
+  context.lineTo(-0.7 * size, -0.85 * size);
+  context.closePath();
+  context.stroke();
+  context.fill();
+  context.restore();
+}
+
 export class Drawing {
   constructor(canvas) {
     this.canvas = canvas;
@@ -231,20 +249,7 @@ export class Drawing {
     context.strokeStyle = this.colours.css(this.colours.paper);
     for (let n = 0; n < CHEVRONS; n++) {
       const along = (n / CHEVRONS + 0.9 * this.flow) % 1;
-      context.save();
-      context.translate(x0 + along * (x1 - x0), y0 + along * (y1 - y0));
-      context.rotate(Math.atan2(y1 - y0, x1 - x0));
-      context.globalAlpha = Math.min(1, 5 * Math.min(along, 1 - along));
-      context.lineWidth = 1.5;
-      context.beginPath();
-      context.moveTo(size, 0);
-      context.lineTo(-0.7 * size, 0.85 * size);
-      context.lineTo(-0.25 * size, 0);
-      context.lineTo(-0.7 * size, -0.85 * size);
-      context.closePath();
-      context.stroke();
-      context.fill();
-      context.restore();
+      chevron(context, [x0, y0], [x1, y1], along, size);
     }
   }
 
