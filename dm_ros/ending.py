@@ -3,10 +3,13 @@
 
 """How a command ends: each expected failure is one line and an exit code, each signal quiet."""
 
+import os
 import signal
 import sys
+import threading
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+AGAIN = 0.001   # s, after which Python has left the __del__ a signal met
 
 
 class Signalled(BaseException):
@@ -21,6 +24,16 @@ def interrupt(number, _):
     """End the work by an exception, so that no unfinished file stays behind."""
     ignore_signals()   # a second one shall not end the tidying up
     raise Signalled(number)
+
+
+def interrupt_again(dropped):
+    """Signal again where Python has dropped a ``Signalled``; to be ``sys.unraisablehook``."""
+    if isinstance(dropped.exc_value, Signalled):
+        number = dropped.exc_value.number
+        signal.signal(number, interrupt)
+        threading.Timer(AGAIN, os.kill, (os.getpid(), number)).start()
+    else:
+        sys.__unraisablehook__(dropped)
 
 
 def ignore_signals():
@@ -44,6 +57,7 @@ def run_command(name, work, written='stdout', *, expected=(OSError, ValueError),
     # a background job of a script shall go on to ignore what its shell lets it ignore
     before = {number: signal.signal(number, on_signal) for number in SIGNALS
               if until_signal or signal.getsignal(number) != signal.SIG_IGN}
+    hook, sys.unraisablehook = sys.unraisablehook, interrupt_again
     try:
         work()
     except Signalled as error:
@@ -54,6 +68,7 @@ def run_command(name, work, written='stdout', *, expected=(OSError, ValueError),
         print(f'{name}: error:', in_one_line(error, written), file=sys.stderr)
         return code
     finally:
+        sys.unraisablehook = hook
         if until_signal:
             ignore_signals()   # all is done, but the interpreter has still to end
         else:

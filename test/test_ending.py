@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -76,6 +77,38 @@ def test_a_signal_ends_the_work_quietly_and_a_second_one_not_its_tidying_up(
     assert tidied and capsys.readouterr() == ('', '')
     if until_signal:   # nothing disturbs the end of the interpreter
         assert signal.getsignal(number) == signal.SIG_IGN
+
+
+class Signals:
+    """Sends this process a signal where Python drops every exception."""
+
+    def __init__(self, number):
+        self._number = number
+
+    def __del__(self):
+        os.kill(os.getpid(), self._number)
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_a_signal_in_the_end_of_an_object_ends_the_work_too(number, capsys):
+    def work():
+        Signals(number)
+        time.sleep(60.0)
+        raise AssertionError('it was lost')
+    hook = sys.unraisablehook
+    assert run_command('tool', work) == 128 + number
+    assert sys.unraisablehook is hook
+    assert capsys.readouterr() == ('', '')
+
+
+class Fails:
+    def __del__(self):
+        raise ValueError('in its end')
+
+
+def test_what_else_fails_in_the_end_of_an_object_is_told(capsys):
+    assert run_command('tool', Fails) == 0
+    assert 'ValueError: in its end' in capsys.readouterr().err
 
 
 def test_handlers_are_given_back_and_what_a_shell_lets_it_ignore_stays_ignored():
