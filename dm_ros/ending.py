@@ -3,13 +3,11 @@
 
 """How a command ends: each expected failure is one line and an exit code, each signal quiet."""
 
-import os
 import signal
 import sys
-import threading
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-AGAIN = 0.001   # s, after which Python has left the __del__ a signal met
+AGAIN = 0.001   # s, after which Python has left the __del__ that a signal met
 
 
 class Signalled(BaseException):
@@ -27,13 +25,21 @@ def interrupt(number, _):
 
 
 def interrupt_again(dropped):
-    """Signal again where Python has dropped a ``Signalled``; to be ``sys.unraisablehook``."""
-    if isinstance(dropped.exc_value, Signalled):
-        number = dropped.exc_value.number
-        signal.signal(number, interrupt)
-        threading.Timer(AGAIN, os.kill, (os.getpid(), number)).start()
-    else:
+    """Raise a ``Signalled`` again that Python has dropped, as ``sys.unraisablehook``."""
+    if not isinstance(dropped.exc_value, Signalled):
         sys.__unraisablehook__(dropped)
+        return
+    number = dropped.exc_value.number
+
+    def again(_, frame):
+        while frame:
+            if frame.f_code is interrupt_again.__code__:   # here it would be dropped too
+                signal.setitimer(signal.ITIMER_REAL, AGAIN)
+                return
+            frame = frame.f_back
+        raise Signalled(number)
+    signal.signal(signal.SIGALRM, again)
+    signal.setitimer(signal.ITIMER_REAL, AGAIN)
 
 
 def ignore_signals():
