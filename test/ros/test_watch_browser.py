@@ -300,6 +300,29 @@ def test_the_buttons_pause_step_and_go_on(ros, screen):
     ros.until(lambda: it.text('#answer') == 'continue: running')
 
 
+def test_a_late_answer_does_not_hide_that_to_what_was_pressed_last(ros, screen):
+    node = ros.differential()
+    it = screen('--control')
+    ros.until(lambda: it.text('#state') == 'running')
+    it.driver.execute_script("""
+        const direct = window.fetch;
+        window.late = new Promise(done => { window.come = done; });
+        window.fetch = async (url, options) => {
+            const answer = await direct(url, options);
+            if (!options.body.includes('pause')) return answer;
+            await window.late;
+            setTimeout(() => { window.came = true; }, 100);
+            return answer;
+        };""")
+    it.press('Pause')
+    ros.until(lambda: not node.control.running.is_set())
+    it.press('Continue')
+    ros.until(lambda: it.text('#answer') == 'continue: running')
+    it.driver.execute_script('window.come();')
+    ros.until(lambda: it.driver.execute_script('return window.came'))
+    assert it.text('#answer') == 'continue: running'
+
+
 def test_the_page_knows_at_once_that_it_paused_the_node_and_a_reset_lets_go(ros, screen):
     node = ros.differential()
     it = screen('--control')

@@ -37,6 +37,7 @@ export class Control {
     this.waiting = null;   // values that a slider has and the server has not
     this.told = {};        // values that the server has
     this.flushed = Promise.resolve();   // when the last values have been sent
+    this.asked = 0;        // how many requests have been sent
   }
 
   show(scene) {
@@ -188,22 +189,27 @@ export class Control {
     await this.#post(request);
   }
 
+  // Answers come in any order; the words that stay are those for what was asked last.
   async #post(request) {
+    const number = ++this.asked;
+    const say = (text, bad) => {
+      if (number === this.asked) this.#say(text, bad);
+    };
     try {
       const response = await fetch('control', {
         method: 'POST', body: JSON.stringify({...request, viewer: this.viewer}),
         headers: {'Content-Type': 'application/json', 'X-Watch-Token': this.token}});
       if (!response.ok) {
-        this.#say((await response.text()).trim(), true);
+        say((await response.text()).trim(), true);
         this.tell(this.told);
       } else {
         const {success, message} = await response.json();
-        this.#say(DONE[request.do] ?? `${request.do}: ${message || 'done'}`, !success);
+        say(DONE[request.do] ?? `${request.do}: ${message || 'done'}`, !success);
         this.#done(request);
         if (success) this.onDone(request.do);
       }
     } catch {
-      this.#say('watch does not answer', true);
+      say('watch does not answer', true);
       this.tell(this.told);
     }
   }
