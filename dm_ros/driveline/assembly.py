@@ -15,6 +15,7 @@ from dm_ros.driveline.differential import Differential
 from dm_ros.driveline.parameters import (
     AxleParameters,
     below,
+    Shaft,
     ShaftParameters,
     StepParameters,
     VehicleParameters,
@@ -112,6 +113,8 @@ class Assembly:
                 raise ValueError(f'layout: {name}: there is no flange {flange}')
         if name in [connection.name for connection in self.connections]:
             raise ValueError(f'layout: there are two connections {name}')
+        if not isinstance(shaft, Shaft):
+            raise ValueError(f'layout: {name}: {shaft!r} is no Shaft')
         kind = below(ShaftParameters, f'shaft.{shaft.name}')
         self.connections.append(Connection(
             name, a, b, self._table(kind(shaft.stiffness, shaft.damping, shaft.gap))))

@@ -9,7 +9,7 @@ import math
 import pytest
 
 from dm_ros import Driveline
-from dm_ros.driveline.layouts import HALF, half_shafts, wheels
+from dm_ros.driveline.layouts import HALF, wheels
 
 NAN, INF = math.nan, math.inf
 
@@ -142,11 +142,6 @@ def twice(car):
     car.axle('rear')
 
 
-def elsewhere(car):
-    wheels(car, 'front', 1.0, is_front=True)
-    half_shafts(car, Driveline, {'front_left': car.input()})
-
-
 def two_connections(car):
     rear, (left, right) = car.axle('rear'), wheels(car, 'rear', -1.0, is_front=False).values()
     car.connect('half', rear.left, left, HALF)
@@ -167,11 +162,15 @@ def strange_flange(car):
     car.connect('input', car.input(), ('rear', 'pinion'), HALF)
 
 
+def no_shaft(car):
+    car.connect('input', car.input(), car.axle('rear').pinion, None)
+
+
 @pytest.mark.parametrize('layout, words', [
     (no_input, 'layout: there is no input'), (no_rear, 'no wheel carries the rear'),
     (twice, 'two elements rear'), (two_connections, 'two connections half'),
     (two_kinds, 'two kinds have one name'), (no_inertia, 'the inertia of case is 0.0'),
-    (strange_flange, 'input: there is no flange')])
+    (strange_flange, 'input: there is no flange'), (no_shaft, 'input: None is no Shaft')])
 def test_a_layout_that_is_none_is_refused(layout, words):
     with pytest.raises(ValueError, match=words):
         Driveline(layout)

@@ -28,7 +28,7 @@ def draw(file, columns, names, title):
         line[0].set_ylabel(metric)
     for ax, axis in zip(axes[-1], columns):
         unit = '' if axis.row.unit == '1' else f', {axis.row.unit}'
-        ax.set_xlabel(axis.name.replace('.', '.\n', 1) + unit)
+        ax.set_xlabel('.\n'.join(axis.name.rsplit('.', 1)) + unit)
     figure.savefig(file, format='png')
 
 
