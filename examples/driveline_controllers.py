@@ -157,7 +157,7 @@ def run(case, controlled, bag=None):
 
 def draw(path, case, records):
     """Draw a case; records: {how it was driven: ``DrivelineRecord``}."""
-    figure = Figure(figsize=(8, 2.2 * len(case.lines) + 0.8), dpi=85, layout='constrained')
+    figure = Figure(figsize=(10, 2.2 * len(case.lines) + 0.8), dpi=85, layout='constrained')
     axes = figure.subplots(len(case.lines), 1, sharex=True)
     axes[0].set_title(case.title, fontsize='medium')
     for axis, (label, of) in zip(axes, case.lines.items()):
@@ -167,7 +167,7 @@ def draw(path, case, records):
                           label=f'{name}, {how}')
         axis.set_ylabel(label)
         axis.grid(alpha=0.25)
-        axis.legend(fontsize='small', loc='upper left')
+        axis.legend(fontsize='small', loc='upper left', bbox_to_anchor=(1.0, 1.02), frameon=False)
     axes[-1].set_xlabel('time, s')
     figure.savefig(path)
 

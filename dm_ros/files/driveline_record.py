@@ -58,7 +58,7 @@ class DrivelineRecord(Table):
         """Draw the record as PNG into a binary file: body, wheels, tyres, torques."""
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(9, 10), dpi=110, layout='constrained')
+        figure = Figure(figsize=(11, 10), dpi=110, layout='constrained')
         axes = figure.subplots(4, 1, sharex=True)
         axes[0].plot(self.time, self.longitudinal_speed, label='speed, m/s')
         if np.any(self.yaw_rate):
@@ -75,5 +75,6 @@ class DrivelineRecord(Table):
         axes[-1].set_xlabel('time, s')
         for axis in axes:
             axis.grid(alpha=0.25)
-            axis.legend(fontsize='small', loc='upper right')
+            # beside the panel, where it hides no curve
+            axis.legend(loc='upper left', bbox_to_anchor=(1.0, 1.02), frameon=False)
         figure.savefig(file, format='png')
