@@ -4,7 +4,6 @@
 """A tool that a signal ends while it writes OUT.csv leaves that and its folder as they were."""
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -18,10 +17,9 @@ def check_interrupt(number, folder, *arguments):
     before = set(folder.iterdir())
     # the tool finds the package where this process does
     path = os.pathsep.join(path or os.getcwd() for path in sys.path)
-    process = subprocess.Popen(   # a shell's background job, as a test run may be, ignores SIGINT
+    process = subprocess.Popen(
         [*arguments, '--out', 'OUT.csv'], stderr=subprocess.PIPE, text=True, cwd=folder,
-        env={**os.environ, 'PYTHONPATH': path},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+        env={**os.environ, 'PYTHONPATH': path})
     try:
         end = time.monotonic() + PATIENCE
         while not any(path.suffix == '.part' for path in folder.iterdir()):

@@ -21,9 +21,8 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(autouse=True)
 def handlers():
-    """Give the signals back as they were, and have SIGINT as in the foreground."""
+    """Give the signals back as they were."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
@@ -145,8 +144,7 @@ def test_a_signal_ends_each_command_quietly_also_while_python_loads_it(name, num
     module, until_signal = COMMANDS[name]
     ended = subprocess.run(
         [sys.executable, '-c', EARLY.format(name=name, module=module, number=int(number))],
-        capture_output=True, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
+        capture_output=True, text=True)
     assert (ended.returncode, ended.stdout, ended.stderr) == (
         0 if until_signal else 128 + number, '', '')
 
