@@ -13,8 +13,8 @@ import pytest
 
 from dm_ros import Simulation, VARIANTS
 from dm_ros.files.bag import Bag, INPUT_DEPTH, OUTPUT_DEPTH, TickBag
-from dm_ros.files.published import Published
-from dm_ros.files.recorded_drive import read_drive
+from dm_ros.files.published import Published, RATE_TOLD
+from dm_ros.files.recorded_drive import DIAGNOSTICS, read_drive
 from dm_ros.mechanism.variants import MECHANISMS, variant_named
 from dm_ros.testing import DirectDifferential
 from dm_ros.tools.simulate import main
@@ -29,6 +29,7 @@ LAG = '    lsd.clutch.rear.actuator_time_constant: 0.03\n'
 CASES = {
     **{variant: (variant, '', 1000.0) for variant in VARIANTS},
     'rate': ('lsd_ode', '', 300.0),
+    'slow': ('lsd_ode', '', 100.0),
     'odd rate': ('symmetric_ode', '', 123.456),
     'prefix': ('lsd_dae', '    joint_prefix: rear_\n', 500.0),
     'lag': ('lsd_ode', LAG, 1000.0),
@@ -238,6 +239,39 @@ def test_with_stamps_of_system_time_each_message_is_a_tick_and_what_is_late_is_t
     told = capsys.readouterr().err
     assert '201 messages with stamps of system time' in told and '1/1000 s; 1 came late' in told
     assert Path('AGAIN.csv').read_bytes() == Path('OUT.csv').read_bytes()
+
+
+@pytest.mark.parametrize('told, dt', [
+    ({'/differential': ['100', '100']}, 0.01),
+    ({'/differential': ['100'], '/rear/differential': ['500']}, 0.01),
+    ({'/elsewhere': ['100']}, 0.01),                        # recorded under another name
+    ({'/elsewhere': ['100'], '/other': ['200']}, 1 / 99),   # whose?
+    ({'/differential': ['100', '200']}, 1 / 99),            # when?
+    ({'/differential': ['fast']}, 1 / 99), ({'/differential': ['0']}, 1 / 99), ({}, 1 / 99)])
+def test_the_rate_that_a_node_told_counts_where_its_stamps_are_of_system_time(told, dt):
+    recorded('slow')
+    # as on a busy machine, where most ticks are late
+    cut('drive', 'real', lambda stamp: True, clock=lambda time: time * 1006 // 1000 + 10**18 + 1)
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import get_typestore, Stores
+    types = get_typestore(Stores.ROS2_JAZZY)
+    array, status, value, header, time = (types.types[kind] for kind in (
+        DIAGNOSTICS, 'diagnostic_msgs/msg/DiagnosticStatus', 'diagnostic_msgs/msg/KeyValue',
+        'std_msgs/msg/Header', 'builtin_interfaces/msg/Time'))
+    with AnyReader([Path('real')]) as reader, Bag('whole') as bag:
+        topics = {c.topic: bag.topic(c.topic, c.msgtype) for c in reader.connections}
+        for connection, came, data in reader.messages():
+            bag.write(topics[connection.topic], came, data)
+        diagnostics = bag.topic('/diagnostics', DIAGNOSTICS)
+        for node, rates in told.items():
+            for rate in rates:
+                bag.write(diagnostics, came, types.serialize_cdr(array(header(time(0, 0), ''), [
+                    status(0, f'{node}: loop', 'running', node, [value('ticks', '5'),
+                                                                 value(RATE_TOLD, rate)])]),
+                    DIAGNOSTICS))
+    assert read_drive('whole', Simulation('lsd_ode').mechanism, 500.0).dt == dt
+    assert simulate('--variant', 'lsd_ode', '--torques', 'whole', '--out', 'AGAIN.csv') == 0
+    assert (Path('AGAIN.csv').read_bytes() == Path('OUT.csv').read_bytes()) == (dt == 0.01)
 
 
 def test_a_bag_of_commands_alone_is_played_as_they_came(capsys):

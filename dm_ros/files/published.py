@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 FRAME = 'housing_link'   # against which shafts turn: the root of the URDF
 EMPTY = array('d')
+RATE_TOLD = 'rate wanted [Hz]'   # key of /diagnostics, of ticks in simulated time
 
 
 class Arrays(NamedTuple):

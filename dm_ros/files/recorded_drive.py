@@ -17,14 +17,15 @@ from statistics import median
 from typing import NamedTuple
 
 from dm_ros.files.bag import JOINT_STATE, require_rosbags
-from dm_ros.files.published import input_topics
+from dm_ros.files.published import input_topics, RATE_TOLD
 from dm_ros.files.torque_table import TorqueTable
 from dm_ros.motion.held_inputs import HeldInputs, Joints
 
 SUFFIXES = '.mcap', '.db3'
+DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 JITTER = 0.1     # of a tick by which the usual gap of stamps of system time may be off
 ROUNDING = 5e-3  # likewise, by which a rate that is told by them is
-LATE = 1.5       # ticks between two stamps of system time, from which on one is missing
+LATE = 1.5       # usual gaps between two stamps of system time, from which on one is missing
 
 
 class RecordedDrive(NamedTuple):
@@ -49,7 +50,8 @@ def read_drive(path, mechanism, rate, node=None, timeout=0.0, default=None):
 
     :param path: a folder, or an .mcap or .db3 file; mechanism: the ``Mechanism`` to run.
     :param rate: ticks in a second that are expected, if stamps of system time are about so far
-        apart; stamps of simulated time tell it by themselves.
+        apart and the node has not told it on ``/diagnostics``; stamps of simulated time tell it by
+        themselves.
     :param node: full name of the node that was recorded; None for the only one, or of several
         for that named ``default``.
     :param timeout: s, after which its commands were stale, but in lockstep; 0 for never.
@@ -159,6 +161,26 @@ class _Drive:
             early += 1
         self.commands = [(max(0, seen - early), *rest) for seen, *rest in self.commands]
 
+    def _told_rate(self):
+        """Return the rate, Hz, that the node told of itself, None for none or several."""
+        topics = {(c.topic, c.msgtype): c for c in self._reader.connections}
+        told = topics.get(('/diagnostics', DIAGNOSTICS))
+        rates = {}   # of each node
+        for _, _, message in self._messages([told]) if told else ():
+            for status in message.status:
+                for value in status.values:
+                    if value.key == RATE_TOLD:
+                        rates.setdefault(status.hardware_id, set()).add(value.value)
+        own = [rates[self.node]] if self.node in rates else [   # it has another name in the bag
+            told for node, told in rates.items()
+            if (f'{node}/joint_states', JOINT_STATE) not in topics]
+        try:
+            (rate,), = own
+            rate = float(rate)
+        except ValueError:
+            return None
+        return rate if 0.0 < rate < math.inf else None
+
     # inputs
 
     def _of_states(self, rate, timeout):
@@ -169,6 +191,7 @@ class _Drive:
         simulated = ends is not None
         if not simulated:
             ends = range(len(stamps))
+            rate = self._told_rate() or rate
         remarks = [_remark(stamps, ends, rate, simulated)]
         if self._mechanism.actuators and not self.forces and not self._presses():
             remarks.append(f'without {self.node}/clutches no force is taken to be on them')
@@ -307,7 +330,8 @@ def _remark(stamps, ends, rate, simulated):
     if simulated:
         lost = ends[-1] - ends[0] + 1 - len(ends)
         return f'{lost} ticks are missing, and are taken to be as the next one' if lost else ''
-    late = sum(after - before > LATE * 1e9 / rate for before, after in pairwise(stamps))
+    gaps = [after - before for before, after in pairwise(stamps)]
+    late = sum(gap > LATE * median(gaps) for gap in gaps)
     return (f'{len(stamps)} messages with stamps of system time: each is taken for the end of a '
             f'tick of 1/{rate:g} s' + (f'; {late} came late, as ticks were missed by the node or '
                                        'messages by the recorder' if late else ''))

@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from dm_ros.driven import Condition
+from dm_ros.files.published import RATE_TOLD
 from dm_ros.ros.graph import in_words
 
 
@@ -97,7 +98,7 @@ class Diagnostics:
             'loop', active(self.waiting, self.driven, self.set_back, self.missing, plant.coarse,
                            plant.out_of_range), running, {
                 **plant.told_of_loop(),
-                'rate wanted [Hz]': f'{1.0 / plant.simulation.dt:g}',
+                RATE_TOLD: f'{1.0 / plant.simulation.dt:.12g}',
                 'rate held [Hz]': f'{(ticks - ticks_before) / (now - before) * 1e9:.2f}',
                 **lateness_values(pacer.take_lateness()),
                 'ticks': ticks,
