@@ -37,7 +37,8 @@ def interrupt_again(dropped):
                 signal.setitimer(signal.ITIMER_REAL, AGAIN)
                 return
             frame = frame.f_back
-        raise Signalled(number)
+        if sys.unraisablehook is interrupt_again:   # the work has not ended by itself
+            raise Signalled(number)
     signal.signal(signal.SIGALRM, again)
     signal.setitimer(signal.ITIMER_REAL, AGAIN)
 

@@ -14,7 +14,7 @@ import time
 import pytest
 
 from dm_ros.commands import COMMANDS
-from dm_ros.ending import run_command, SIGNALS
+from dm_ros.ending import AGAIN, run_command, SIGNALS
 
 ROOT = Path(__file__).parents[1]
 
@@ -97,6 +97,13 @@ def test_a_signal_in_the_end_of_an_object_ends_the_work_too(number, capsys):
     hook = sys.unraisablehook
     assert run_command('tool', work) == 128 + number
     assert sys.unraisablehook is hook
+    assert capsys.readouterr() == ('', '')
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_a_signal_in_the_end_of_the_last_object_disturbs_nothing(number, capsys):
+    assert run_command('tool', lambda: Signals(number) and None) == 0
+    time.sleep(5 * AGAIN)
     assert capsys.readouterr() == ('', '')
 
 

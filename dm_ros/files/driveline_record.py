@@ -5,6 +5,7 @@
 
 import numpy as np
 
+from dm_ros.files.plot import BESIDE
 from dm_ros.files.record import Table
 
 BODY = ('x', 'y', 'yaw', 'longitudinal_speed', 'lateral_speed', 'yaw_rate',
@@ -75,6 +76,5 @@ class DrivelineRecord(Table):
         axes[-1].set_xlabel('time, s')
         for axis in axes:
             axis.grid(alpha=0.25)
-            # beside the panel, where it hides no curve
-            axis.legend(loc='upper left', bbox_to_anchor=(1.0, 1.02), frameon=False)
+            axis.legend(**BESIDE)
         figure.savefig(file, format='png')

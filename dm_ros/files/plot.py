@@ -20,6 +20,9 @@ COLORS = {   # a shaft has one colour in all panels, and its moment as well
     'left_clutch': '#8ab8de', 'right_clutch': '#eda58f',
 }
 
+# a legend beside its panel, where it hides no curve
+BESIDE = {'loc': 'upper left', 'bbox_to_anchor': (1.0, 1.02), 'frameon': False}
+
 
 def require_matplotlib():
     """Raise ValueError where matplotlib is missing; only pictures need it."""
@@ -89,6 +92,5 @@ def _draw(ax, time, label, curves):
         ax.fill_between(time, -1.5, 1.5, where=curves['power_flow'] < 0, step='pre',
                         color='#d1441f', alpha=0.12, linewidth=0)
     else:
-        # beside the panel, where it hides no curve
-        ax.legend(loc='upper left', bbox_to_anchor=(1.0, 1.02), frameon=False)
+        ax.legend(**BESIDE)
         ax.axhline(0.0, color='0.6', linewidth=0.6, zorder=0)

@@ -331,7 +331,8 @@ def _remark(stamps, ends, rate, simulated):
         lost = ends[-1] - ends[0] + 1 - len(ends)
         return f'{lost} ticks are missing, and are taken to be as the next one' if lost else ''
     gaps = [after - before for before, after in pairwise(stamps)]
-    late = sum(gap > LATE * median(gaps) for gap in gaps)
+    usual = median(gaps)
+    late = sum(gap > LATE * usual for gap in gaps)
     return (f'{len(stamps)} messages with stamps of system time: each is taken for the end of a '
             f'tick of 1/{rate:g} s' + (f'; {late} came late, as ticks were missed by the node or '
                                        'messages by the recorder' if late else ''))

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from dm_ros.files.plot import COLORS, require_matplotlib
+from dm_ros.files.plot import BESIDE, COLORS, require_matplotlib
 
 
 def draw(file, fit, drive, title):
@@ -28,12 +28,12 @@ def draw(file, fit, drive, title):
         above.plot(drive.times, measured, '.', color='0.65', markersize=3, label='measured')
         above.plot(drive.times, run, color=color, linewidth=1.1, label='fitted')
         above.set_ylabel(f'{shaft}, rad/s')
-        above.legend(loc='upper left', bbox_to_anchor=(1.0, 1.02), frameon=False)
+        above.legend(**BESIDE)
         below.axhspan(-2 * noise, 2 * noise, color='0.93', linewidth=0, label='twice the rms')
         below.axhline(0.0, color='0.6', linewidth=0.6)
         below.plot(drive.times, residuals, '.', color=color, markersize=3)
         below.set_ylabel('residual, rad/s')
-        below.legend(loc='upper left', bbox_to_anchor=(1.0, 1.02), frameon=False)
+        below.legend(**BESIDE)
         largest = np.nanmax(np.abs(residuals), initial=3 * noise)
         below.set_ylim(-1.1 * largest, 1.1 * largest)
     for ax in axes:
